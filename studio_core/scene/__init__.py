@@ -1,0 +1,1 @@
+"""The scene as a frozen value: nodes, materials, transforms, what differs between two scenes."""

@@ -1,0 +1,114 @@
+"""Meshes and pictures: the heavy, shared, read-only parts of a scene."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from studio_core.arrays import content_hash, readonly
+
+
+@dataclass(frozen=True, eq=False)
+class Geometry:
+    """A triangle mesh in its own frame, metres, y up. Shared by all its instances.
+
+    positions (P, 3) float32; faces (F, 3) uint32 into positions; normals (P, 3) float32 unit or None;
+    uvs (P, 2) float32 (v up, OpenGL's way) or None; slots (F,) uint16: which of the object's materials a
+    face has. A corner with two normals or two uvs is two positions. Raises ValueError when they do not fit.
+    """
+
+    positions: npt.NDArray[np.float32]
+    faces: npt.NDArray[np.uint32]
+    normals: npt.NDArray[np.float32] | None = None
+    uvs: npt.NDArray[np.float32] | None = None
+    slots: npt.NDArray[np.uint16] | None = None
+
+    def __post_init__(self) -> None:
+        fill = object.__setattr__
+        fill(self, "positions", readonly(self.positions, np.float32, -1, 3))
+        fill(self, "faces", readonly(self.faces, np.uint32, -1, 3))
+        count = len(self.positions)
+        if len(self.faces) and int(self.faces.max()) >= count:
+            raise ValueError("a face names a position that does not exist")
+        for name, width in (("normals", 3), ("uvs", 2)):
+            array = getattr(self, name)
+            if array is not None:
+                fill(self, name, readonly(array, np.float32, -1, width))
+                if len(getattr(self, name)) != count:
+                    raise ValueError(f"{name} and positions differ in length")
+        slots = np.zeros(len(self.faces), np.uint16) if self.slots is None else self.slots
+        fill(self, "slots", readonly(slots, np.uint16, -1))
+        if len(slots) != len(self.faces):
+            raise ValueError("slots and faces differ in length")
+        for array in (self.positions, self.normals, self.uvs):
+            if array is not None and not np.isfinite(array).all():
+                raise ValueError("a mesh must be finite")
+
+    @cached_property
+    def key(self) -> str:
+        """Content hash: equal meshes have equal keys."""
+        return content_hash(*(array for _, array in self.parts()))
+
+    def parts(self) -> tuple[tuple[str, npt.NDArray[Any]], ...]:
+        """Name and array of everything that is there, in a fixed order."""
+        named = (
+            ("positions", self.positions),
+            ("faces", self.faces),
+            ("slots", self.slots),
+            ("normals", self.normals),
+            ("uvs", self.uvs),
+        )
+        return tuple((name, array) for name, array in named if array is not None)
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of all arrays."""
+        return sum(array.nbytes for _, array in self.parts())
+
+    @cached_property
+    def bounds(self) -> npt.NDArray[np.float64]:
+        """(2, 3): lowest and highest corner; zeros for an empty mesh."""
+        if not len(self.positions):
+            return np.zeros((2, 3))
+        return np.stack([self.positions.min(axis=0), self.positions.max(axis=0)]).astype(np.float64)
+
+
+@dataclass(frozen=True, eq=False)
+class Image:
+    """A picture: (H, W, C) float32 or uint8, rows from the top, C 1, 3 or 4.
+
+    `encoding` says what the numbers are: scene-linear Rec.709, sRGB-encoded, or plain data (normals).
+    """
+
+    pixels: npt.NDArray[Any]
+    encoding: Literal["linear", "srgb", "data"] = "linear"
+
+    def __post_init__(self) -> None:
+        dtype = np.uint8 if self.pixels.dtype == np.uint8 else np.float32
+        made = readonly(self.pixels, dtype, -1, -1, -1)
+        if made.shape[2] not in (1, 3, 4) or 0 in made.shape:
+            raise ValueError(f"a picture of shape {made.shape} cannot be used")
+        object.__setattr__(self, "pixels", made)
+
+    @cached_property
+    def key(self) -> str:
+        """Content hash of pixels and encoding."""
+        return f"{content_hash(self.pixels)}-{self.encoding}"
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of the pixels."""
+        return int(self.pixels.nbytes)
+
+
+@dataclass(frozen=True)
+class Texture:
+    """A picture laid on a surface: uv ↦ uv · scale + offset, repeated; multiplies its parameter."""
+
+    image: Image
+    scale: tuple[float, float] = (1.0, 1.0)
+    offset: tuple[float, float] = (0.0, 0.0)
