@@ -63,7 +63,8 @@ def param_infos(params: type) -> dict[str, ParamInfo]:
 
 def defaults(params: type) -> dict[str, Value]:
     """Default value of every parameter."""
-    return {f.name: f.default for f in dataclasses.fields(params) if "param" in f.metadata}
+    found: dict[str, Any] = {f.name: f.default for f in dataclasses.fields(params) if "param" in f.metadata}
+    return found
 
 
 def check(name: str, info: ParamInfo, value: object) -> Value:

@@ -1,0 +1,18 @@
+"""Reflectance models, one file each."""
+
+from studio_core.contract import API, Plugin
+
+_HERE = "studio_plugins.brdfs"
+plugin = Plugin(
+    id="brdfs",
+    label="Reflectance models",
+    api=API,
+    provides={
+        "brdf": {
+            "lambert": f"{_HERE}.lambert:MODEL",
+            "phong": f"{_HERE}.phong:MODEL",
+            "blinn-phong": f"{_HERE}.blinn_phong:MODEL",
+            "ggx": f"{_HERE}.ggx:MODEL",
+        }
+    },
+)

@@ -1,0 +1,178 @@
+"""What plugins provide: the protocols of every kind, in one place.
+
+A plugin is a cheap `Plugin` value found through the entry-point group `studio.plugins`; the objects it
+names by `module:attribute` are imported on first use and must satisfy the protocol of their kind.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from studio_core.params import Value
+from studio_core.scene.nodes import Material, MeshObject, Node, Scene
+
+if TYPE_CHECKING:
+    from studio_core.shading.job import Job
+    from studio_core.shading.pipeline import Stage
+
+API = 1
+KINDS = (
+    "backend",
+    "solver",
+    "brdf",
+    "importer",
+    "exporter",
+    "capturer",
+    "fitter",
+    "stroke_tool",
+    "tonemap",
+    "panel",
+)
+
+
+@dataclass(frozen=True)
+class Plugin:
+    """What an entry point resolves to: `provides[kind][name] = "module:attribute"`."""
+
+    id: str
+    api: int
+    provides: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
+    label: str = ""
+
+
+class Brdf(Protocol):
+    """A reflectance model as a sum of coloured terms: f_r(ω_i, ω_o) = Σ_k c_k · b_k(ω_i, ω_o).
+
+    The scalar kernels b_k depend on the *shape* (roughness, exponent) and are summed over light per vertex;
+    the RGB coefficients c_k (base colour, F0) are applied per pixel afterwards. So a change of colour
+    costs no light sum, and textures act at full resolution.
+
+    `address` is that of a C function, batched over the directions of one shading point:
+
+        void eval(const float* shape, const float* wo, int64 count, const float* wi, float* out)
+
+    in the shading frame (z = normal): wo is (x, y, z); wi is x[count], y[count], z[count]; out is
+    term 0 [count], term 1 [count], … without the cosine. Directions with z ≤ 0 give 0. Finite always.
+    """
+
+    id: str
+    label: str
+    Params: type
+    terms: int
+    textures: tuple[str, ...]
+
+    @property
+    def address(self) -> int:
+        """Address of the kernel above."""
+        ...
+
+    def shape(self, values: Mapping[str, Value]) -> npt.NDArray[np.float32]:
+        """(n,) what the kernel reads; equal shapes need no new light sums."""
+        ...
+
+    def coefficients(self, values: Mapping[str, npt.NDArray[np.floating[Any]]]) -> npt.NDArray[np.float32]:
+        """(..., terms, 3) from parameters of shape (...) or (..., 3), one entry a texel."""
+        ...
+
+
+@dataclass(frozen=True)
+class ImportedModel:
+    """Nodes and materials ready to be added, and in sentences what was repaired or left out."""
+
+    nodes: tuple[Node, ...]
+    materials: tuple[Material, ...]
+    notes: tuple[str, ...] = ()
+
+    @property
+    def objects(self) -> tuple[MeshObject, ...]:
+        """The mesh objects among the nodes."""
+        return tuple(node for node in self.nodes if isinstance(node, MeshObject))
+
+
+class Importer(Protocol):
+    """Reads models. `extensions` are lower case with the dot."""
+
+    label: str
+    extensions: tuple[str, ...]
+
+    def load(self, path: Path, unit: float = 1.0) -> ImportedModel:
+        """Metres from file units by `unit`; raises InputError in one sentence naming file and cause."""
+        ...
+
+
+class Exporter(Protocol):
+    """Writes a scene. `extensions` may be empty for exporters that write a folder."""
+
+    label: str
+    extensions: tuple[str, ...]
+
+    def save(self, scene: Scene, path: Path, registry: Registry) -> tuple[str, ...]:
+        """Write, and say in sentences what could not be expressed."""
+        ...
+
+
+class Registry(Protocol):
+    """How plugins reach what others provide, without importing them."""
+
+    def get(self, kind: str, name: str) -> Any:
+        """The provided object; PluginError when it is unknown or fails to load."""
+        ...
+
+    def names(self, kind: str) -> Sequence[str]:
+        """Everything registered of a kind, bundled first."""
+        ...
+
+    def brdf(self, model: str) -> Brdf:
+        """The BRDF of that name, checked once."""
+        ...
+
+
+class ShadingBackend(Protocol):
+    """Stages that end in `Radiance`; `Params` is a dataclass made with `param`."""
+
+    id: str
+    label: str
+    Params: type
+
+    def stages(self, services: Services) -> Sequence[Stage]:
+        """Fresh stages, in order; the last gives Radiance."""
+        ...
+
+
+@dataclass(frozen=True)
+class Services:
+    """What the composition root hands to backends: threads, registry, cache folder."""
+
+    workers: Any
+    registry: Registry
+    cache: Any = None
+
+
+class Progress(Protocol):
+    """The part of a job that kernels need."""
+
+    def checkpoint(self, done: int = 0, total: int = 0) -> None:
+        """Report, or raise Cancelled."""
+        ...
+
+
+__all__ = [
+    "API",
+    "KINDS",
+    "Brdf",
+    "Exporter",
+    "ImportedModel",
+    "Importer",
+    "Job",
+    "Plugin",
+    "Progress",
+    "Registry",
+    "Services",
+    "ShadingBackend",
+]
