@@ -1,0 +1,140 @@
+"""The plugin host: finds plugins by entry point, loads what they provide on first use, contains failures."""
+
+from __future__ import annotations
+
+import importlib
+import importlib.metadata
+import traceback
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+from studio_core.contract import API, KINDS, Brdf, Plugin
+from studio_core.errors import PluginError
+
+GROUP = "studio.plugins"
+_NEEDS = {
+    "backend": ("id", "label", "Params", "stages"),
+    "brdf": ("id", "label", "Params", "terms", "textures", "address", "shape", "coefficients"),
+    "importer": ("label", "extensions", "load"),
+    "exporter": ("label", "extensions", "save"),
+}
+
+
+@dataclass(frozen=True)
+class Failure:
+    """What went wrong with a plugin, for Help ▸ Plugins."""
+
+    plugin: str
+    what: str
+    traceback: str
+
+
+class PluginHost:
+    """Holds plugins and what they provide. Built once by the composition root and passed along."""
+
+    def __init__(self, plugins: Iterable[Plugin] = ()) -> None:
+        self.plugins: list[Plugin] = []
+        self.failures: list[Failure] = []
+        self._where: dict[tuple[str, str], tuple[Plugin, str]] = {}
+        self._loaded: dict[tuple[str, str], Any] = {}
+        for plugin in plugins:
+            self.add(plugin)
+
+    @classmethod
+    def discover(cls) -> PluginHost:
+        """All installed plugins; one that fails to import is noted, the others load."""
+        host = cls()
+        points = importlib.metadata.entry_points(group=GROUP)
+        bundled_first = sorted(set(points), key=lambda p: (not p.value.startswith("studio_plugins."), p.name))
+        for point in bundled_first:
+            host._contained(point.name, "could not be loaded", partial(_add, host, point))
+        return host
+
+    def add(self, plugin: Plugin) -> None:
+        """Take a plugin in. Raises PluginError when it does not fit this program."""
+        if not isinstance(plugin, Plugin):
+            raise PluginError(f"{plugin!r} is not a studio_core.contract.Plugin")
+        if plugin.api != API:
+            raise PluginError(f"{plugin.id} is made for interface {plugin.api}, this is {API}")
+        for kind, provided in plugin.provides.items():
+            if kind not in KINDS:
+                raise PluginError(f"{plugin.id} provides the unknown kind {kind!r}")
+            for name in provided:
+                if (kind, name) in self._where:
+                    other = self._where[kind, name][0].id
+                    raise PluginError(f"{plugin.id} provides {kind} {name!r}, which {other} already does")
+        self.plugins.append(plugin)
+        for kind, provided in plugin.provides.items():
+            for name, where in provided.items():
+                self._where[kind, name] = (plugin, where)
+
+    def names(self, kind: str) -> Sequence[str]:
+        """Everything registered of a kind, in order of registration."""
+        return [name for have, name in self._where if have == kind]
+
+    def provider(self, kind: str, name: str) -> Plugin:
+        """The plugin that provides it."""
+        self._known(kind, name)
+        return self._where[kind, name][0]
+
+    def get(self, kind: str, name: str) -> Any:
+        """The provided object, imported on first use and checked against its kind."""
+        if (kind, name) not in self._loaded:
+            plugin, where = self._known(kind, name)
+            found: list[Any] = []
+            if not self._contained(
+                plugin.id, f"{kind} {name!r} failed to load", lambda: found.append(self._load(kind, where))
+            ):
+                raise PluginError(
+                    f"plugin {plugin.id}: {kind} {name!r} failed to load: {self.failures[-1].what}"
+                )
+            self._loaded[kind, name] = found[0]
+        return self._loaded[kind, name]
+
+    def brdf(self, model: str) -> Brdf:
+        """The BRDF of that name."""
+        made: Brdf = self.get("brdf", model)
+        return made
+
+    def available(self, kind: str) -> dict[str, Any]:
+        """All objects of a kind that load; the others are among `failures`."""
+        found = {}
+        for name in self.names(kind):
+            try:
+                found[name] = self.get(kind, name)
+            except PluginError:
+                continue
+        return found
+
+    def report(self, plugin: str, what: str, error: BaseException) -> None:
+        """Note that a plugin misbehaved while it ran."""
+        text = "".join(traceback.format_exception(error))
+        self.failures.append(Failure(plugin, f"{what}: {type(error).__name__}: {error}", text))
+
+    def _known(self, kind: str, name: str) -> tuple[Plugin, str]:
+        if (kind, name) not in self._where:
+            known = ", ".join(self.names(kind)) or "none"
+            raise PluginError(f"there is no {kind} {name!r}; known: {known}")
+        return self._where[kind, name]
+
+    def _load(self, kind: str, where: str) -> Any:
+        module, _, attribute = where.partition(":")
+        made = getattr(importlib.import_module(module), attribute)
+        missing = [name for name in _NEEDS.get(kind, ()) if not hasattr(made, name)]
+        if missing:
+            raise PluginError(f"{where} lacks {', '.join(missing)}")
+        return made
+
+    def _contained(self, plugin: str, what: str, action: Callable[[], object]) -> bool:
+        try:
+            action()
+        except (Exception, SystemExit) as error:
+            self.report(plugin, what, error)
+            return False
+        return True
+
+
+def _add(host: PluginHost, point: importlib.metadata.EntryPoint) -> None:
+    host.add(point.load())

@@ -1,0 +1,94 @@
+"""What a person is looking at and holding: view, selection, backend. Not part of the document."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from studio_core.arrays import frozen_map
+from studio_core.scene.diff import Aspect
+from studio_core.scene.nodes import Camera, NodeId, Scene
+from studio_core.scene.transform import IDENTITY, Transform, looking
+from studio_core.signal import Signal
+
+
+@dataclass(frozen=True)
+class View:
+    """A pinhole camera: world from camera, vertical angle in degrees, pixels, orbit distance in metres."""
+
+    transform: Transform = IDENTITY
+    fov: float = 45.0
+    width: int = 960
+    height: int = 540
+    focus: float = 3.0
+
+    @classmethod
+    def of(cls, camera: Camera, scene: Scene, width: int, height: int) -> View:
+        """What a camera of the scene sees."""
+        world = scene.world(camera.id)
+        return cls(dataclasses.replace(world, scale=1.0), camera.fov, width, height, camera.focus)
+
+    @property
+    def target(self) -> tuple[float, float, float]:
+        """The point that the view orbits, world."""
+        x, y, z, _ = (float(v) for v in self.transform.matrix() @ (0.0, 0.0, -self.focus, 1.0))
+        return (x, y, z)
+
+    def sized(self, width: int, height: int) -> View:
+        """The same view in other pixels."""
+        return dataclasses.replace(self, width=max(1, width), height=max(1, height))
+
+
+def framing(low: Iterable[float], high: Iterable[float], view: View) -> View:
+    """A three-quarter view from the front that shows the whole box, metres."""
+    corners = np.array([tuple(low), tuple(high)])
+    centre = corners.mean(axis=0)
+    radius = max(float(np.linalg.norm(corners[1] - corners[0])) / 2, 1e-3)
+    half = np.radians(view.fov / 2)
+    half = min(half, np.arctan(np.tan(half) * view.width / view.height))
+    distance = radius / np.sin(half)
+    eye = centre + distance * np.array([0.45, 0.35, 0.82]) / np.linalg.norm([0.45, 0.35, 0.82])
+    return dataclasses.replace(view, transform=looking(eye, centre), focus=float(distance))
+
+
+class Session:
+    """`changed(aspect)` tells what the picture must follow; `selected()` tells the panels."""
+
+    def __init__(self, view: View | None = None) -> None:
+        self.view = view or View()
+        self.selection: tuple[NodeId, ...] = ()
+        self.backend = "reference"
+        self.params: Mapping[str, Any] = frozen_map()
+        self.exposure = 0.0
+        self.tonemap = "srgb"
+        self.changed: Signal[[Aspect]] = Signal()
+        self.selected: Signal[[]] = Signal()
+        self.displayed: Signal[[]] = Signal()
+
+    def look(self, view: View) -> None:
+        """Another view."""
+        if view != self.view:
+            self.view = view
+            self.changed.emit(Aspect.VIEW)
+
+    def select(self, nodes: Iterable[NodeId]) -> None:
+        """Another selection, without doubles, in order."""
+        made = tuple(dict.fromkeys(nodes))
+        if made != self.selection:
+            self.selection = made
+            self.selected.emit()
+
+    def shade_with(self, backend: str, params: Mapping[str, Any] | None = None) -> None:
+        """Another backend, or other parameters for it."""
+        self.backend, self.params = backend, frozen_map(params or {})
+        self.changed.emit(Aspect.QUALITY)
+
+    def display(self, *, exposure: float | None = None, tonemap: str | None = None) -> None:
+        """How the picture is shown; nothing is shaded again."""
+        self.exposure = self.exposure if exposure is None else exposure
+        self.tonemap = self.tonemap if tonemap is None else tonemap
+        self.displayed.emit()

@@ -1,0 +1,19 @@
+"""What is to be shaded: an immutable request."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from studio_core.scene.nodes import Scene
+from studio_core.session import View
+
+
+@dataclass(frozen=True)
+class Frame:
+    """Scene, view and the backend's parameters; `revision` grows with every request."""
+
+    scene: Scene
+    view: View
+    params: Any
+    revision: int = 0

@@ -1,0 +1,128 @@
+"""Stages: what depends on what, and what need not be done again.
+
+A stage reruns when a change dirties it or when something it needs was rebuilt. Changes accumulate for a
+stage until it succeeds, so cancelled work is not forgotten. A stage that returns its previous artifact
+(the same object) counts as not rebuilt, and what follows is skipped.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Protocol, TypeVar
+
+from studio_core.scene.diff import Aspect, Changes, everything
+from studio_core.shading.frame import Frame
+from studio_core.shading.job import Job
+
+A = TypeVar("A")
+
+
+@dataclass(frozen=True)
+class Inputs:
+    """What a stage gets: the artifacts it needs, what changed since it last succeeded, what it gave then."""
+
+    artifacts: Mapping[type, Any]
+    changes: Changes
+    previous: Any = None
+    rebuilt: frozenset[type] = frozenset()
+
+    def __getitem__(self, kind: type[A]) -> A:
+        found: A = self.artifacts[kind]
+        return found
+
+
+class Stage(Protocol):
+    """Pure: the same frame and inputs give the same artifact; `previous` and `changes` only save work."""
+
+    needs: tuple[type, ...]
+    gives: type
+    dirtied_by: Aspect
+
+    def run(self, frame: Frame, inputs: Inputs, job: Job) -> Any:
+        """The artifact, or `inputs.previous` where nothing differs."""
+        ...
+
+
+@dataclass
+class _Record:
+    pending: Changes
+    seen: dict[type, int] = field(default_factory=dict)
+    artifact: Any = None
+    stamp: int = 0
+
+
+@dataclass(frozen=True)
+class StageRun:
+    """One line of a report: which stage, whether it ran, whether it gave something new, seconds."""
+
+    name: str
+    ran: bool
+    rebuilt: bool
+    seconds: float
+
+
+class Pipeline:
+    """Runs stages in order over frames. Owned by the compute thread."""
+
+    def __init__(self, stages: Sequence[Stage]) -> None:
+        given: set[type] = set()
+        for stage in stages:
+            missing = [need.__name__ for need in stage.needs if need not in given]
+            if missing:
+                raise ValueError(f"{type(stage).__name__} needs {', '.join(missing)} before it")
+            if stage.gives in given:
+                raise ValueError(f"two stages give {stage.gives.__name__}")
+            given.add(stage.gives)
+        self.stages = tuple(stages)
+        self.current = 0
+        self.report: list[StageRun] = []
+        self._records: list[_Record] | None = None
+
+    def artifact(self, kind: type[A]) -> A | None:
+        """What the stage that gives `kind` last made, or None."""
+        for stage, record in zip(self.stages, self._records or (), strict=False):
+            if stage.gives is kind:
+                found: A | None = record.artifact
+                return found
+        return None
+
+    def mark(self, frame: Frame, changes: Changes) -> None:
+        """Remember what changed for every stage."""
+        if self._records is None:
+            self._records = [_Record(everything(frame.scene)) for _ in self.stages]
+        else:
+            for record in self._records:
+                record.pending |= changes
+
+    def dirties(self, changes: Changes, upto: int) -> bool:
+        """Whether a stage at or before index `upto` would rerun."""
+        return any(stage.dirtied_by & changes.aspects for stage in self.stages[: upto + 1])
+
+    def update(self, frame: Frame, changes: Changes, job: Job) -> Any:
+        """Bring everything up to date; the last stage's artifact. Raises Cancelled between and in stages."""
+        self.mark(frame, changes)
+        assert self._records is not None
+        self.report = []
+        made: dict[type, tuple[Any, int]] = {}
+        for index, (stage, record) in enumerate(zip(self.stages, self._records, strict=True)):
+            self.current = index
+            job.checkpoint()
+            rebuilt = frozenset(need for need in stage.needs if record.seen.get(need) != made[need][1])
+            started = time.perf_counter()
+            ran = record.stamp == 0 or bool(rebuilt or stage.dirtied_by & record.pending.aspects)
+            before = record.stamp
+            if ran:
+                artifacts = {need: made[need][0] for need in stage.needs}
+                inputs = Inputs(artifacts, record.pending, record.artifact, rebuilt)
+                result = stage.run(frame, inputs, job)
+                if result is not record.artifact or record.stamp == 0:
+                    record.artifact = result
+                    record.stamp += 1
+                record.seen = {need: made[need][1] for need in stage.needs}
+            record.pending = Changes()
+            made[stage.gives] = (record.artifact, record.stamp)
+            seconds = time.perf_counter() - started
+            self.report.append(StageRun(type(stage).__name__, ran, record.stamp != before, seconds))
+        return self._records[-1].artifact

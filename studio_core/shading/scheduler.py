@@ -1,0 +1,177 @@
+"""Who computes when: the newest request, on one compute thread, without losing what is still good.
+
+A running job is cancelled only when a new change dirties a stage at or before the one it is in; otherwise
+it finishes and the newest request runs next. Everything here but `_run` happens on the thread that made
+the scheduler; results come back through the injected `post`.
+"""
+
+from __future__ import annotations
+
+import queue
+import threading
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any, Protocol
+
+from studio_core.errors import Cancelled
+from studio_core.scene.diff import Changes
+from studio_core.shading.frame import Frame
+from studio_core.shading.job import Job
+from studio_core.shading.pipeline import Pipeline
+from studio_core.signal import Signal
+
+
+class Executor(Protocol):
+    """Runs callables one after the other."""
+
+    def submit(self, work: Callable[[], None]) -> None:
+        """Run `work` later, or now."""
+        ...
+
+    def close(self) -> None:
+        """Wait for what runs, refuse what comes."""
+        ...
+
+
+class InlineExecutor:
+    """Runs at once on the calling thread: scripts, the command line, tests."""
+
+    def submit(self, work: Callable[[], None]) -> None:
+        """Run `work` now."""
+        work()
+
+    def close(self) -> None:
+        """Nothing to wait for."""
+
+
+class ComputeThread:
+    """The one thread that owns pipelines and kernels."""
+
+    def __init__(self) -> None:
+        self._queue: queue.SimpleQueue[Callable[[], None] | None] = queue.SimpleQueue()
+        self._thread = threading.Thread(target=self._loop, name="compute", daemon=True)
+        self._thread.start()
+
+    def submit(self, work: Callable[[], None]) -> None:
+        """Run `work` after what is already waiting."""
+        self._queue.put(work)
+
+    def close(self) -> None:
+        """Wait for what runs."""
+        self._queue.put(None)
+        self._thread.join()
+
+    def _loop(self) -> None:
+        while (work := self._queue.get()) is not None:
+            work()
+
+
+class Scheduler:
+    """Feeds one pipeline with frames.
+
+    `shown(frame, artifact, final)` gives partial and final results, never one older than the last shown;
+    `failed(frame, error)`; `progress(job)`; `idle()` when nothing is left to do. All on the owner's thread.
+    """
+
+    def __init__(
+        self,
+        pipeline: Pipeline,
+        executor: Executor,
+        post: Callable[[Callable[[], None]], None] = lambda call: call(),
+        label: str = "Shading",
+    ) -> None:
+        self.shown: Signal[[Frame, Any, bool]] = Signal()
+        self.failed: Signal[[Frame, Exception]] = Signal()
+        self.progress: Signal[[Job]] = Signal()
+        self.idle: Signal[[]] = Signal()
+        self.pipeline = pipeline
+        self.label = label
+        self.cancelled_jobs = 0
+        self.finished_jobs = 0
+        self._executor = executor
+        self._post = post
+        self._revision = 0
+        self._last_shown = 0
+        self._job: Job | None = None
+        self._waiting: tuple[Frame, Changes] | None = None
+        self._closed = False
+
+    @property
+    def busy(self) -> bool:
+        """Whether a job runs or waits."""
+        return self._job is not None or self._waiting is not None
+
+    @property
+    def job(self) -> Job | None:
+        """What runs now."""
+        return self._job
+
+    def request(self, frame: Frame, changes: Changes) -> int:
+        """Ask for a picture of `frame`, in which `changes` happened since the last request; its revision."""
+        if self._closed:
+            return self._revision
+        self._revision += 1
+        frame = replace(frame, revision=self._revision)
+        if self._waiting is not None:
+            changes = self._waiting[1] | changes
+        self._waiting = (frame, changes)
+        if self._job is None:
+            self._start()
+        elif self.pipeline.dirties(changes, self.pipeline.current):
+            self._job.cancel()
+        return self._revision
+
+    def cancel(self) -> None:
+        """Stop what runs and forget what waits; its changes are kept for the next request."""
+        if self._waiting is not None:
+            frame, changes = self._waiting
+            self._waiting = None
+            self._executor.submit(lambda: self.pipeline.mark(frame, changes))
+        if self._job is not None:
+            self._job.cancel()
+
+    def close(self) -> None:
+        """Cancel and take no more requests."""
+        self._closed = True
+        self.cancel()
+
+    def _start(self) -> None:
+        assert self._waiting is not None
+        (frame, changes), self._waiting = self._waiting, None
+        job = Job(
+            self.label,
+            on_progress=lambda j: self._post(lambda: self.progress.emit(j)),
+            on_publish=lambda artifact: self._post(lambda: self._show(frame, artifact, False)),
+        )
+        self._job = job
+        self._executor.submit(lambda: self._run(frame, changes, job))
+
+    def _run(self, frame: Frame, changes: Changes, job: Job) -> None:
+        result: Any = None
+        error: Exception | None = None
+        try:
+            result = self.pipeline.update(frame, changes, job)
+        except Exception as caught:
+            error = caught
+        except SystemExit as caught:  # a plugin must not take the program down
+            error = RuntimeError(f"a stage tried to leave the program: {caught}")
+        self._post(lambda: self._finish(frame, job, result, error))
+
+    def _finish(self, frame: Frame, job: Job, result: Any, error: Exception | None) -> None:
+        self._job = None
+        if isinstance(error, Cancelled):
+            self.cancelled_jobs += 1
+        elif error is not None:
+            self.failed.emit(frame, error)
+        else:
+            self.finished_jobs += 1
+            self._show(frame, result, True)
+        if self._waiting is not None and not self._closed:
+            self._start()
+        elif self._job is None:
+            self.idle.emit()
+
+    def _show(self, frame: Frame, artifact: Any, final: bool) -> None:
+        if frame.revision >= self._last_shown and not self._closed:
+            self._last_shown = frame.revision
+            self.shown.emit(frame, artifact, final)
