@@ -1,0 +1,96 @@
+"""Blinn–Phong: a matte part and a highlight around the half vector, normalised.
+
+f_r = diffuse / π + specular · N(n) · (n·h)^n with N(n) = (n + 2)(n + 4) / (8π (2^(−n/2) + n))
+(Blinn 1977; N gives the lobe the albedo 1 at normal incidence exactly: ∫ cos^n(θ/2) cos θ dω = 1/N,
+Sloan & Hoffman in Akenine-Möller et al., "Real-Time Rendering", 3rd ed., 7.6). The albedo is highest
+there and falls towards grazing angles, so it never exceeds 1.
+Terms: b0 = 1, b1 = the lobe; c0 = diffuse / π, c1 = specular.
+
+=============  ========  =====  ===========================================================
+parameter      range     unit   meaning
+=============  ========  =====  ===========================================================
+diffuse        0…1       –      albedo of the matte part, linear Rec.709
+specular       0…1       –      albedo of the highlight at normal incidence, linear Rec.709
+exponent       1…1e5     –      sharpness n; about four times Phong's for the same highlight
+=============  ========  =====  ===========================================================
+
+Where diffuse + specular exceeds 1 in a channel, both are divided by their sum there: no more light comes
+back than arrives, and the ratio of matte to shine is kept.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from studio_core.jit import batch_function
+from studio_core.kernels.brdf import HALF, LEAST_HEIGHT, ONE, SIGNATURE, ZERO, carray, power_of_complement
+from studio_core.params import Colour, Value, param
+
+
+@dataclass(frozen=True)
+class Params:
+    """Parameters of `BlinnPhong`."""
+
+    diffuse: Colour = param((0.6, 0.6, 0.6), "Matte colour", "Albedo of the matte part", low=0.0, high=1.0)
+    specular: Colour = param(
+        (0.1, 0.1, 0.1), "Highlight colour", "Albedo of the highlight seen head-on", low=0.0, high=1.0
+    )
+    exponent: float = param(
+        200.0, "Sharpness", "Exponent of the highlight; higher is smaller and brighter",
+        low=1.0, high=1e5, scale="log",
+    )  # fmt: skip
+
+
+@batch_function(SIGNATURE)
+def evaluate(shape: Any, wo: Any, count: int, wi: Any, out: Any) -> None:
+    """b0 = 1, b1 = N (n·h)^n; see `studio_core.contract.Brdf`. shape: n, N(n)."""
+    s = carray(shape, 2)
+    o = carray(wo, 3)
+    half_n, peak = HALF * s[0], s[1]
+    ox, oy, oz = o[0], o[1], o[2]
+    directions = carray(wi, 3 * count)
+    x, y, z = directions[:count], directions[count : 2 * count], directions[2 * count :]
+    terms = carray(out, 2 * count)
+    b0, b1 = terms[:count], terms[count:]
+    for k in range(count):
+        lit = ONE if (oz > ZERO and z[k] > ZERO) else ZERO
+        hx, hy, hz = x[k] + ox, y[k] + oy, max(z[k] + oz, LEAST_HEIGHT)
+        flat, height = hx * hx + hy * hy, hz * hz
+        whole = flat + height
+        b0[k] = lit
+        b1[k] = lit * peak * power_of_complement(flat / whole, height / whole, half_n)  # sin² of h, cos²
+
+
+class BlinnPhong:
+    """See the module; satisfies `studio_core.contract.Brdf`."""
+
+    id = "blinn-phong"
+    label = "Blinn–Phong"
+    Params = Params
+    terms = 2
+    textures: tuple[str, ...] = ("diffuse", "specular")
+
+    @property
+    def address(self) -> int:
+        """Address of `evaluate`."""
+        return evaluate.address
+
+    def shape(self, values: Mapping[str, Value]) -> npt.NDArray[np.float32]:
+        """(2,): exponent and the lobe's peak."""
+        n = float(np.clip(values["exponent"], 1.0, 1e5))
+        return np.array([n, (n + 2) * (n + 4) / (8 * np.pi * (2 ** (-n / 2) + n))], np.float32)
+
+    def coefficients(self, values: Mapping[str, npt.NDArray[np.floating[Any]]]) -> npt.NDArray[np.float32]:
+        """(..., 2, 3): diffuse / π and specular after the energy rule of the module."""
+        diffuse = np.clip(np.asarray(values["diffuse"], np.float32), 0, 1)
+        specular = np.clip(np.asarray(values["specular"], np.float32), 0, 1)
+        excess = np.maximum(diffuse + specular, np.float32(1))
+        return np.stack(np.broadcast_arrays(diffuse / excess / np.float32(np.pi), specular / excess), axis=-2)
+
+
+MODEL = BlinnPhong()

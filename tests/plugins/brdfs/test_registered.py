@@ -1,0 +1,246 @@
+"""What every registered reflectance model must hold: bundled ones, and those of installed plugins."""
+
+from __future__ import annotations
+
+import ctypes
+import functools
+import importlib
+import itertools
+from collections.abc import Iterator
+from importlib.metadata import entry_points
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from oracles.brdf import ORACLES, albedo, unit
+
+from studio_core.params import ParamInfo, defaults, param_infos
+from studio_plugins.brdfs import plugin as bundled
+
+Float = npt.NDArray[np.float32]
+GRID = 16
+
+
+def _models() -> Iterator[Any]:
+    found = [bundled, *(point.load() for point in entry_points(group="studio.plugins"))]
+    for name in {name: None for plugin in found for name in plugin.provides.get("brdf", {}).values()}:
+        module, _, attribute = name.partition(":")
+        yield getattr(importlib.import_module(module), attribute)
+
+
+MODELS = {model.id: model for model in _models()}
+every_model = pytest.mark.parametrize("model", MODELS.values(), ids=MODELS.keys())
+with_oracle = pytest.mark.parametrize(
+    "model", [MODELS[name] for name in ORACLES if name in MODELS], ids=lambda m: m.id
+)
+POINTERS = [ctypes.c_void_p] * 2
+
+
+def evaluate(model: Any, shape: Float, wo: Any, wi: Any) -> Float:
+    """(N, terms) of the compiled kernel for one wo (3,) and wi (N, 3)."""
+    call = ctypes.CFUNCTYPE(None, *POINTERS, ctypes.c_int64, *POINTERS)(model.address)
+    wi = np.ascontiguousarray(np.asarray(wi, np.float32).T)
+    wo = np.ascontiguousarray(wo, np.float32)
+    out = np.full((model.terms, wi.shape[1]), np.nan, np.float32)
+    call(shape.ctypes.data, wo.ctypes.data, wi.shape[1], wi.ctypes.data, out.ctypes.data)
+    return out.T
+
+
+def at(info: ParamInfo, fraction: float) -> Any:
+    """The value a slider shows at `fraction` of its way."""
+    if info.kind == "flag":
+        return fraction > 0.5
+    if info.kind == "choice":
+        return info.choices[round(fraction * (len(info.choices) - 1))]
+    if info.scale == "log":
+        value = float(np.exp((1 - fraction) * np.log(info.low) + fraction * np.log(info.high)))
+        value = min(max(value, info.low), info.high)
+    else:
+        value = info.low + fraction * (info.high - info.low)
+    if info.kind == "integer":
+        return round(value)
+    return (value, value, value) if info.kind == "colour" else value
+
+
+def split(model: Any) -> tuple[list[str], list[str]]:
+    """Names of the parameters that change the shape, and of the others."""
+    infos, start = param_infos(model.Params), defaults(model.Params)
+    known = model.shape(start)
+    shaping = [
+        name
+        for name, info in infos.items()
+        if any(not np.array_equal(model.shape({**start, name: at(info, f)}), known) for f in (0, 0.37, 1))
+    ]
+    return shaping, [name for name in infos if name not in shaping]
+
+
+def shaped(model: Any, fraction: float) -> dict[str, Any]:
+    """Defaults, with everything that changes the shape at `fraction` of its way."""
+    infos = param_infos(model.Params)
+    return {**defaults(model.Params), **{name: at(infos[name], fraction) for name in split(model)[0]}}
+
+
+def coefficients(model: Any, values: Any) -> Float:
+    return model.coefficients({k: np.asarray(v, np.float32) for k, v in values.items()})
+
+
+def grid(model: Any) -> tuple[list[float], npt.NDArray[np.float64], list[dict[str, Any]]]:
+    """Shape fractions, wo, and every corner of what is not shape."""
+    fractions = list(np.linspace(0, 1, GRID)) if split(model)[0] else [0.0]
+    theta = np.radians(np.linspace(0, 89, GRID))
+    wo = np.stack([np.sin(theta), 0 * theta, np.cos(theta)], -1)
+    infos, names = param_infos(model.Params), split(model)[1]
+    corners = [
+        {name: at(infos[name], f) for name, f in zip(names, fs, strict=True)}
+        for fs in itertools.product((0.0, 1.0), repeat=len(names))
+    ]
+    return fractions, wo, corners
+
+
+def grey(values: dict[str, Any]) -> dict[str, Any]:
+    """Colours as one channel."""
+    return {name: np.array(v[:1]) if isinstance(v, tuple) else v for name, v in values.items()}
+
+
+@functools.cache
+def kernel_albedo(model: Any) -> npt.NDArray[np.float64]:
+    """(shapes, angles, terms) of the compiled kernel."""
+    fractions, wo, _ = grid(model)
+    found = []
+    for fraction in fractions:
+        shape = model.shape(shaped(model, fraction))
+
+        def f(row: Any, wi: Any, shape: Float = shape) -> Any:
+            made = np.empty((len(row), model.terms))
+            for r in np.unique(row):
+                made[row == r] = evaluate(model, shape, wo[r], wi[row == r])
+            return made
+
+        found.append(albedo(f, wo))
+    return np.stack(found)
+
+
+@every_model
+def test_returns_no_more_light_than_arrives(model: Any) -> None:
+    found = kernel_albedo(model)
+    for corner in grid(model)[2]:
+        c = coefficients(model, {**defaults(model.Params), **corner}).astype(np.float64)
+        furnace = np.einsum("sat,tc->sac", found, c)
+        assert furnace.max() <= 1.001, corner
+        assert furnace.min() >= 0, corner
+
+
+@with_oracle
+def test_albedo_is_the_float64_tables(model: Any) -> None:
+    fractions, wo, corners = grid(model)
+    found = kernel_albedo(model)
+    oracle = ORACLES[model.id]
+    for s, fraction in enumerate(fractions):
+
+        def f(row: Any, wi: Any, fraction: float = fraction) -> Any:
+            values = [{**shaped(model, fraction), **corner} for corner in corners]
+            return np.concatenate([oracle(grey(v), wo[row], wi) for v in values], -1)
+
+        table = albedo(f, wo)
+        for k, corner in enumerate(corners):
+            c = coefficients(model, {**shaped(model, fraction), **corner})[:, 0].astype(np.float64)
+            np.testing.assert_allclose(found[s] @ c, table[:, k], rtol=5e-3, atol=1e-6, err_msg=str(corner))
+
+
+def directions(rng: np.random.Generator, count: int) -> npt.NDArray[np.float64]:
+    """Above the surface: all over, grazing, and near one another's mirror images."""
+    all_over = unit(rng.normal(size=(count, 3)))
+    all_over[:, 2] = np.abs(all_over[:, 2])
+    all_over[: count // 8, 2] *= 1e-3
+    all_over = unit(all_over)
+    spread = 10.0 ** rng.uniform(-5, -0.5, size=(count, 1))
+    mirrored = unit(all_over * [-1, -1, 1] + spread * rng.normal(size=(count, 3)))
+    mirrored[:, 2] = np.abs(mirrored[:, 2])
+    return np.concatenate([all_over, mirrored])
+
+
+@every_model
+@pytest.mark.parametrize("fraction", [0.0, 0.3, 0.7, 1.0])
+def test_is_reciprocal(model: Any, fraction: float) -> None:
+    shape = model.shape(shaped(model, fraction))
+    w = directions(np.random.default_rng(5), 160).astype(np.float32)  # 51,360 pairs a shape
+    there = np.stack([evaluate(model, shape, o, w) for o in w])
+    back = there.transpose(1, 0, 2)
+    assert there.max() > 0
+    np.testing.assert_allclose(there, back, rtol=1e-4, atol=1e-6 * float(there.max()))
+
+
+@with_oracle
+@settings(max_examples=60, deadline=None)
+@given(data=st.data(), seed=st.integers(0, 2**32 - 1))
+def test_kernel_is_the_oracle(model: Any, data: Any, seed: int) -> None:
+    infos = param_infos(model.Params)
+    values = {name: at(info, data.draw(st.floats(0, 1), name)) for name, info in infos.items()}
+    w = directions(np.random.default_rng(seed), 32).astype(np.float32)
+    c = coefficients(model, values).astype(np.float64)
+    for o, near in zip(w[:32], w[32:], strict=True):
+        wi = np.concatenate([w[:8], near[None]])
+        made = evaluate(model, model.shape(values), o, wi) @ c
+        truth = ORACLES[model.id](values, np.broadcast_to(o, wi.shape).astype(np.float64), wi)
+        np.testing.assert_allclose(made, truth, rtol=1e-2, atol=2e-5)
+
+
+tiny = st.sampled_from([0.0, 1e-45, 1e-38, 1e-30, 1e-20, 1e-12, 1e-7, 1e-4])
+component = st.one_of(tiny, st.floats(-1, 1, width=32))
+
+
+@st.composite
+def any_direction(draw: Any) -> Float:
+    """A unit vector, often grazing, sometimes below the surface."""
+    x, y = draw(component), draw(component)
+    z = draw(st.one_of(tiny, component))
+    length = float(np.sqrt(x * x + y * y + z * z))
+    return np.array([x, y, z] if length > 1e-3 else [1, 0, 0], np.float32) / np.float32(
+        length if length > 1e-3 else 1
+    )
+
+
+@every_model
+@settings(max_examples=150, deadline=None)
+@given(data=st.data(), wo=any_direction(), wi=st.lists(any_direction(), min_size=1, max_size=9))
+def test_is_finite_everywhere_and_dark_from_below(model: Any, data: Any, wo: Float, wi: list[Float]) -> None:
+    infos = param_infos(model.Params)
+    fraction = st.one_of(st.sampled_from([0.0, 1.0]), st.floats(0, 1))
+    values = {name: at(info, data.draw(fraction, name)) for name, info in infos.items()}
+    mirrored = [w * np.array([-1, -1, 1], np.float32) for w in [*wi, wo]]
+    every = np.array([*wi, *mirrored, wo])
+    made = evaluate(model, model.shape(values), wo, every)
+    assert np.isfinite(made).all()
+    assert (made >= 0).all()
+    assert not made[every[:, 2] <= 0].any()
+    if wo[2] <= 0:
+        assert not made.any()
+
+
+@every_model
+def test_coefficients_are_per_texel(model: Any) -> None:
+    rng = np.random.default_rng(2)
+    infos = param_infos(model.Params)
+    texels = {
+        name: rng.uniform(0, 1, (4, 5, 3) if infos[name].kind == "colour" else (4, 5)).astype(np.float32)
+        for name in model.textures
+    }
+    plain = {k: np.asarray(v, np.float32) for k, v in defaults(model.Params).items()}
+    made = model.coefficients({**plain, **texels})
+    assert made.shape == (4, 5, model.terms, 3)
+    assert made.dtype == np.float32
+    one = {**plain, **{name: texel[2, 3] for name, texel in texels.items()}}
+    np.testing.assert_array_equal(made[2, 3], model.coefficients(one))
+    assert set(model.textures) <= set(split(model)[1])
+
+
+@every_model
+def test_parameters_are_documented(model: Any) -> None:
+    for name, info in param_infos(model.Params).items():
+        assert info.label, name
+        if info.kind in ("number", "integer", "colour"):
+            assert np.isfinite([info.low, info.high]).all(), name
+    assert model.Params() == model.Params()

@@ -1,0 +1,34 @@
+"""The shared pieces of reflectance kernels against float64."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from studio_core.kernels.brdf import power_of_complement, schlick_weight
+
+
+@settings(max_examples=400, deadline=None)
+@given(t=st.one_of(st.floats(0, 2, width=32), st.floats(0, 2**-10, width=32)), n=st.floats(0, 1e5, width=32))
+def test_powers_keep_their_digits_near_one(t: float, n: float) -> None:
+    made = power_of_complement(np.float32(t), np.float32(1 - t), np.float32(n))
+    truth = math.exp(n * math.log1p(-t)) if t < 1 else 0.0
+    if truth > 1e-36:
+        assert abs(made / truth - 1) < 2e-5
+    else:
+        assert 0 <= made < 1e-35
+
+
+@given(c=st.floats(-1, 1, width=32))
+def test_schlick_weight(c: float) -> None:
+    assert math.isclose(schlick_weight(np.float32(c)), (1 - c) ** 5, rel_tol=1e-5)
+
+
+@given(rest=st.floats(2**-40, 0.5, width=32), n=st.floats(0.5, 20, width=32))
+def test_powers_keep_their_digits_near_zero(rest: float, n: float) -> None:
+    made = power_of_complement(np.float32(1 - rest), np.float32(rest), np.float32(n))
+    if rest**n > 1e-36:
+        assert abs(made / rest**n - 1) < 2e-5
