@@ -22,11 +22,13 @@ def test_powers_keep_their_digits_near_one(t: float, n: float) -> None:
         assert 0 <= made < 1e-35
 
 
+@settings(deadline=None)
 @given(c=st.floats(-1, 1, width=32))
 def test_schlick_weight(c: float) -> None:
     assert math.isclose(schlick_weight(np.float32(c)), (1 - c) ** 5, rel_tol=1e-5)
 
 
+@settings(deadline=None)
 @given(rest=st.floats(2**-40, 0.5, width=32), n=st.floats(0.5, 20, width=32))
 def test_powers_keep_their_digits_near_zero(rest: float, n: float) -> None:
     made = power_of_complement(np.float32(1 - rest), np.float32(rest), np.float32(n))
