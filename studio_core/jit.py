@@ -164,6 +164,7 @@ Arrays are passed as pointers to their first item, integers as 64-bit (pointers,
 parameters they also arrive on every ABI we run on), floats as they are. The arrays must outlive the call.
 """
 pointer = cast(Callable[[int], Any], intrinsic(_pointer))
-"""``numba.carray(pointer(address), shape, dtype)`` is the array at an address."""
+carray = cast(Callable[..., Any], numba.carray)
+"""``carray(pointer(address), shape, dtype)`` is the array at an address, in kernels."""
 address_of = cast(Callable[[Any], int], intrinsic(_address_of))
 """``address_of(array)`` is the address of the array's first item; the array must outlive its use."""
