@@ -18,13 +18,17 @@ from studio_core.signal import Signal
 
 @dataclass(frozen=True)
 class View:
-    """A pinhole camera: world from camera, vertical angle in degrees, pixels, orbit distance in metres."""
+    """A pinhole camera: world from camera, vertical angle in degrees, pixels, orbit distance in metres.
+
+    A pixel is the mean of `antialias`² samples.
+    """
 
     transform: Transform = IDENTITY
     fov: float = 45.0
     width: int = 960
     height: int = 540
     focus: float = 3.0
+    antialias: int = 2
 
     @classmethod
     def of(cls, camera: Camera, scene: Scene, width: int, height: int) -> View:

@@ -5,7 +5,8 @@ from __future__ import annotations
 import itertools
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Any
 
 from studio_core.errors import Cancelled
@@ -34,6 +35,7 @@ class Job:
         self.started = time.monotonic()
         self._on_progress = on_progress
         self._on_publish = on_publish
+        self._finish: Callable[[Any], Any] = lambda artifact: artifact
         self._cancelled = threading.Event()
 
     def cancel(self) -> None:
@@ -57,4 +59,13 @@ class Job:
     def publish(self, artifact: Any) -> None:
         """Show a partial result; ignored where nobody listens."""
         if self._on_publish is not None:
-            self._on_publish(artifact)
+            self._on_publish(self._finish(artifact))
+
+    @contextmanager
+    def publishing(self, finish: Callable[[Any], Any]) -> Iterator[None]:
+        """Inside, what is published first goes through `finish`."""
+        before, self._finish = self._finish, finish
+        try:
+            yield
+        finally:
+            self._finish = before

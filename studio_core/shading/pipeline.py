@@ -2,7 +2,8 @@
 
 A stage reruns when a change dirties it or when something it needs was rebuilt. Changes accumulate for a
 stage until it succeeds, so cancelled work is not forgotten. A stage that returns its previous artifact
-(the same object) counts as not rebuilt, and what follows is skipped.
+(the same object) counts as not rebuilt, and what follows is skipped. A partial artifact that a stage
+publishes flows through the stages after it.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any, Protocol, TypeVar
 
 from studio_core.scene.diff import Aspect, Changes, everything
@@ -116,7 +118,8 @@ class Pipeline:
             if ran:
                 artifacts = {need: made[need][0] for need in stage.needs}
                 inputs = Inputs(artifacts, record.pending, record.artifact, rebuilt)
-                result = stage.run(frame, inputs, job)
+                with job.publishing(partial(self._flow, frame, index, dict(made), job)):
+                    result = stage.run(frame, inputs, job)
                 if result is not record.artifact or record.stamp == 0:
                     record.artifact = result
                     record.stamp += 1
@@ -126,3 +129,15 @@ class Pipeline:
             seconds = time.perf_counter() - started
             self.report.append(StageRun(type(stage).__name__, ran, record.stamp != before, seconds))
         return self._records[-1].artifact
+
+    def _flow(
+        self, frame: Frame, index: int, made: dict[type, tuple[Any, int]], job: Job, artifact: Any
+    ) -> Any:
+        """What the stages after `index` make of a partial artifact; nothing of it is kept."""
+        artifacts = {kind: found for kind, (found, _) in made.items()}
+        artifacts[self.stages[index].gives] = artifact
+        for stage in self.stages[index + 1 :]:
+            needed = {need: artifacts[need] for need in stage.needs}
+            inputs = Inputs(needed, everything(frame.scene), None, frozenset(stage.needs))
+            artifacts[stage.gives] = stage.run(frame, inputs, job)
+        return artifacts[self.stages[-1].gives]

@@ -1,0 +1,193 @@
+"""What stages hand to each other, keyed by type. Treat everything here as read-only.
+
+V shading vertices, F faces, M materials, S directions, N picture samples.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from studio_core.scene.nodes import Environment, Light, MaterialId, NodeId
+from studio_core.scene.transform import Transform
+from studio_core.session import View
+
+if TYPE_CHECKING:
+    from studio_core.kernels.light_tree import LightTree
+    from studio_core.kernels.raycast import RayCaster
+    from studio_core.scene.world_mesh import WorldMesh
+
+TERMS = 3  # most terms a BRDF may have; kernels and canvases have room for these
+
+F32 = npt.NDArray[np.float32]
+
+
+@dataclass(frozen=True)
+class Surfaces:
+    """What is lit: the shading meshes of all shown objects in the world.
+
+    `mesh.material` indexes `materials`; `opacity` is per material; `budget` is how many vertices were
+    asked for.
+    """
+
+    nodes: tuple[NodeId, ...]
+    materials: tuple[MaterialId, ...]
+    mesh: WorldMesh
+    opacity: F32
+    budget: int
+
+
+@dataclass(frozen=True)
+class Casters:
+    """Ray casters over the same objects: `shadow` knows what stops light, `primary` what is seen.
+
+    Moved objects move in place, so only the newest `Casters` may be used; it is owned by the compute thread.
+    `primary` faces are those of the shading meshes. `meshes` tells whether the same meshes are meant.
+    """
+
+    shadow: RayCaster
+    primary: RayCaster
+    meshes: tuple[object, ...]
+    transforms: tuple[Transform, ...]
+
+
+@dataclass(frozen=True)
+class Shapes:
+    """BRDF kernels per material: address, number of terms, and where its shape starts in `data`."""
+
+    address: npt.NDArray[np.int64]
+    terms: npt.NDArray[np.int64]
+    offset: npt.NDArray[np.int64]
+    data: F32
+    problems: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Lamp:
+    """A lamp in the world at unit gain. `axis` is where it shines, `across` and `up` span an area lamp."""
+
+    node: NodeId
+    kind: str  # point, spot, directional, area
+    position: npt.NDArray[np.float64]
+    axis: npt.NDArray[np.float64]
+    across: npt.NDArray[np.float64]
+    up: npt.NDArray[np.float64]
+    cos_cone: float = -1.0
+    cos_inner: float = -1.0
+    angle: float = 0.0
+
+
+@dataclass(frozen=True)
+class Lighting:
+    """All lights at unit gain: one layer of radiance each.
+
+    `tree` holds the environment integrated over the leaves of the finest direction set; None without one.
+    `integrated` tells of which picture, rotation and fineness.
+    """
+
+    environment: Environment | None
+    tree: LightTree | None
+    lamps: tuple[Lamp, ...]
+    integrated: object = None
+
+    @property
+    def layers(self) -> tuple[NodeId, ...]:
+        """Ids of the lights, the environment first."""
+        first = (self.environment.id,) if self.environment is not None else ()
+        return (*first, *(lamp.node for lamp in self.lamps))
+
+
+@dataclass(frozen=True)
+class Hits:
+    """What each picture sample sees first. Row-major over pixels, then over the n×n samples of a pixel.
+
+    `face` is an index into `mesh.faces` or -1 (nothing); barycentrics (u, v) weigh the second and third
+    corner. `behind` holds what transparent surfaces in front leave to be seen: further layers, each with
+    the sample's index.
+    """
+
+    view: View
+    samples: int
+    face: npt.NDArray[np.int32]
+    u: F32
+    v: F32
+    distance: F32
+    behind: tuple[tuple[npt.NDArray[np.int64], Hits], ...] = ()
+
+
+@dataclass(frozen=True)
+class LayerRadiance:
+    """One light's contribution at unit gain: terms (V, TERMS, 3), irradiance (V, 3)."""
+
+    terms: F32
+    irradiance: F32
+
+
+@dataclass(frozen=True)
+class Radiance:
+    """Radiance per shading vertex, by light layer and BRDF term, towards `view`.
+
+    B(x, ω_o) = Σ_layers gain · Σ_k c_k · terms[k]. `valid` marks the vertices that were computed.
+    `directions` says how finely, `final` whether it is as fine as asked for.
+    """
+
+    surfaces: Surfaces
+    hits: Hits | None
+    layers: Mapping[NodeId, LayerRadiance]
+    valid: npt.NDArray[np.bool_]
+    directions: int
+    final: bool
+    counts: Mapping[str, int] = field(default_factory=dict)
+
+    def combined(self, lights: Mapping[NodeId, Light]) -> F32:
+        """(V, TERMS, 3): the layers weighted with the gains of `lights`; layers without a light are off."""
+        made = np.zeros((len(self.valid), TERMS, 3), np.float32)
+        for node, layer in self.layers.items():
+            if node in lights:
+                made += layer.terms * np.asarray(lights[node].gain(), np.float32)
+        return made
+
+    def irradiance(self, lights: Mapping[NodeId, Light]) -> F32:
+        """(V, 3): the same for irradiance."""
+        made = np.zeros((len(self.valid), 3), np.float32)
+        for node, layer in self.layers.items():
+            if node in lights:
+                made += layer.irradiance * np.asarray(lights[node].gain(), np.float32)
+        return made
+
+
+@dataclass(frozen=True)
+class Picture:
+    """What the camera sees: scene-linear (H, W, 3), coverage (H, W), node index (H, W) with -1 for nothing.
+
+    `distance` (H, W) is metres along the ray of a pixel's first sample, inf where it meets nothing.
+    """
+
+    radiance: Radiance
+    linear: F32
+    coverage: F32
+    node: npt.NDArray[np.int32]
+    distance: F32
+
+    @property
+    def nodes(self) -> tuple[NodeId, ...]:
+        """What `node` indexes."""
+        return self.radiance.surfaces.nodes
+
+
+__all__ = [
+    "TERMS",
+    "Casters",
+    "Hits",
+    "Lamp",
+    "LayerRadiance",
+    "Lighting",
+    "Picture",
+    "Radiance",
+    "Shapes",
+    "Surfaces",
+]

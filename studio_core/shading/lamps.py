@@ -1,0 +1,104 @@
+"""Lamps of the scene as samples of directions and irradiance, at white unit gain."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import numpy.typing as npt
+
+from studio_core.scene.nodes import AreaLamp, DirectionalLamp, Light, PointLamp, Scene, SpotLamp
+from studio_core.shading.artifacts import Lamp
+
+F64 = npt.NDArray[np.float64]
+
+
+def lamps(scene: Scene) -> tuple[Lamp, ...]:
+    """Every shown lamp of the scene in the world."""
+    found = []
+    for node in scene.of(Light):
+        kind = _KINDS.get(type(node))
+        if kind is None or not scene.shown(node.id):
+            continue
+        world = scene.world(node.id).matrix()
+        right, up, back = (world[:3, i] / np.linalg.norm(world[:3, i]) for i in range(3))
+        scale = float(np.linalg.norm(world[:3, 0]))
+        cos_cone = cos_inner = -1.0
+        angle = 0.0
+        if isinstance(node, SpotLamp):
+            cos_cone = math.cos(math.radians(node.cone))
+            cos_inner = math.cos(math.radians(min(node.inner, node.cone)))
+        elif isinstance(node, DirectionalLamp):
+            angle = math.radians(node.angle)
+        elif isinstance(node, AreaLamp):
+            right, up = right * node.width * scale, up * node.height * scale
+        found.append(Lamp(node.id, kind, world[:3, 3], -back, right, up, cos_cone, cos_inner, angle))
+    return tuple(found)
+
+
+_KINDS = {PointLamp: "point", SpotLamp: "spot", DirectionalLamp: "directional", AreaLamp: "area"}
+
+
+def spot_falloff(cosine: F64, cos_inner: float, cos_cone: float) -> F64:
+    """1 inside the full cone, 0 outside the cone, smoothstep of the cosine between."""
+    if cos_inner - cos_cone < 1e-9:
+        return (cosine >= cos_cone).astype(np.float64)
+    t = np.clip((cosine - cos_cone) / (cos_inner - cos_cone), 0.0, 1.0)
+    return t * t * (3 - 2 * t)
+
+
+def lamp_samples(
+    lamp: Lamp, positions: F64, samples: int, centre: F64
+) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.float32], npt.NDArray[np.float32]]:
+    """Directions (P, Q, 3), irradiance (P, Q) on a surface facing each, distances (P, Q; inf for suns).
+
+    Positions are relative to `centre`. Point and spot lamps need one sample; rectangles and discs take
+    `samples`, the same Fibonacci lattice for every point.
+    """
+    if lamp.kind == "directional":
+        discs = _disc(1 if lamp.angle <= 0 else samples)
+        tangent, bitangent = _tangents(-lamp.axis)
+        spread = math.tan(lamp.angle / 2)
+        aim = -lamp.axis + spread * (discs[:, :1] * tangent + discs[:, 1:] * bitangent)
+        aim /= np.linalg.norm(aim, axis=1, keepdims=True)
+        shape = (len(positions), len(aim))
+        directions = np.broadcast_to(aim.astype(np.float32), (*shape, 3))
+        weight = np.full(shape, 1.0 / len(aim), np.float32)
+        return np.ascontiguousarray(directions), weight, np.full(shape, np.inf, np.float32)
+    if lamp.kind == "area":
+        grid = _lattice(samples) - 0.5
+        places = lamp.position + grid[:, :1] * lamp.across + grid[:, 1:] * lamp.up
+        power = float(np.linalg.norm(np.cross(lamp.across, lamp.up))) / samples
+    else:
+        places = lamp.position[None]
+        power = 1.0
+    towards = (places - centre)[None] - positions[:, None]
+    distance = np.linalg.norm(towards, axis=2)
+    distance = np.maximum(distance, 1e-6)
+    directions = towards / distance[..., None]
+    weight = power / distance**2
+    if lamp.kind == "area":
+        weight = weight * np.maximum(-directions @ lamp.axis, 0.0)
+    elif lamp.kind == "spot":
+        weight = weight * spot_falloff(-directions @ lamp.axis, lamp.cos_inner, lamp.cos_cone)
+    return directions.astype(np.float32), weight.astype(np.float32), distance.astype(np.float32)
+
+
+def _lattice(count: int) -> F64:
+    i = np.arange(count) + 0.5
+    return np.stack([i / count, (i * 0.6180339887498949) % 1.0], axis=1)
+
+
+def _disc(count: int) -> F64:
+    if count == 1:
+        return np.zeros((1, 2))
+    lattice = _lattice(count)
+    radius, turn = np.sqrt(lattice[:, 0]), 2 * np.pi * lattice[:, 1]
+    return np.stack([radius * np.cos(turn), radius * np.sin(turn)], axis=1)
+
+
+def _tangents(axis: F64) -> tuple[F64, F64]:
+    other = np.array([0.0, 1.0, 0.0]) if abs(axis[1]) < 0.9 else np.array([1.0, 0.0, 0.0])
+    tangent = np.cross(other, axis)
+    tangent /= np.linalg.norm(tangent)
+    return tangent, np.cross(axis, tangent)

@@ -1,0 +1,131 @@
+"""From a scene's materials to what kernels and pixels need."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from studio_core.contract import Brdf, Registry
+from studio_core.errors import InputError, LucarneError, PluginError
+from studio_core.params import Value, check, defaults, param_infos
+from studio_core.scene.geometry import Image, Texture
+from studio_core.scene.nodes import Material, MaterialId, Scene
+from studio_core.shading.artifacts import TERMS, Shapes
+
+FALLBACK = "lambert"
+
+
+@dataclass(frozen=True)
+class Resolved:
+    """A material with its model and all parameter values; `problem` says what had to be replaced."""
+
+    brdf: Brdf
+    values: Mapping[str, Value]
+    textures: Mapping[str, Texture]
+    problem: str = ""
+
+
+def resolve(material: Material, registry: Registry) -> Resolved:
+    """Model and checked values; what is unknown or does not fit is replaced by defaults and said."""
+    problem = ""
+    try:
+        brdf = registry.brdf(material.model)
+        if brdf.terms > TERMS:
+            raise PluginError(f"model {material.model!r} has {brdf.terms} terms, {TERMS} are possible")
+    except LucarneError as error:
+        problem = f"{material.name}: {error}; shown as matte grey"
+        brdf = registry.brdf(FALLBACK)
+        return Resolved(brdf, defaults(brdf.Params), {}, problem)
+    infos, values = param_infos(brdf.Params), defaults(brdf.Params)
+    for name, value in material.values.items():
+        if name in infos:
+            try:
+                values[name] = check(name, infos[name], value)
+            except InputError as error:
+                problem = f"{material.name}: {error}"
+    textures = {name: t for name, t in material.textures.items() if name in brdf.textures}
+    return Resolved(brdf, values, textures, problem)
+
+
+def shapes(scene: Scene, materials: Sequence[MaterialId], registry: Registry) -> Shapes:
+    """The table of BRDF kernels for `materials`."""
+    address, terms, offset, problems = [], [], [], []
+    data: list[npt.NDArray[np.float32]] = []
+    length = 0
+    for material in materials:
+        resolved = resolve(scene.material(material), registry)
+        shape = np.atleast_1d(np.asarray(resolved.brdf.shape(resolved.values), np.float32))
+        if not np.isfinite(shape).all():
+            raise PluginError(f"model {resolved.brdf.id!r} gave a shape that is not finite")
+        address.append(resolved.brdf.address)
+        terms.append(resolved.brdf.terms)
+        offset.append(length)
+        data.append(shape)
+        length += len(shape)
+        if resolved.problem:
+            problems.append(resolved.problem)
+    flat = np.concatenate([*data, np.zeros(1, np.float32)])
+    made = (np.array(address, np.int64), np.array(terms, np.int64), np.array(offset, np.int64))
+    return Shapes(*made, flat, tuple(problems))
+
+
+def same_shapes(a: Shapes, b: Shapes) -> bool:
+    """Whether the kernels would compute the same."""
+    pairs = ((a.address, b.address), (a.terms, b.terms), (a.offset, b.offset), (a.data, b.data))
+    return all(np.array_equal(x, y) for x, y in pairs)
+
+
+def coefficients(resolved: Resolved) -> npt.NDArray[np.float32]:
+    """(TERMS, 3) of an untextured material, or (H, W, TERMS, 3) with rows from v = 0 up."""
+    values: dict[str, Any] = {
+        name: np.asarray(v, np.float32) for name, v in resolved.values.items() if _numeric(v)
+    }
+    size = max((t.image.pixels.shape[:2] for t in resolved.textures.values()), default=None)
+    for name, texture in resolved.textures.items():
+        texels = linear(texture.image)[::-1]
+        if size is not None and texels.shape[:2] != size:
+            rows = np.arange(size[0]) * texels.shape[0] // size[0]
+            columns = np.arange(size[1]) * texels.shape[1] // size[1]
+            texels = texels[rows][:, columns]
+        scalar = values[name].ndim == 0
+        texels = texels[..., 0] if scalar else np.broadcast_to(texels[..., :3], (*texels.shape[:2], 3))
+        values[name] = values[name] * texels
+    if size is not None:
+        for name, value in values.items():
+            tail = value.shape[-1:] if value.ndim in (1, 3) else ()
+            values[name] = np.broadcast_to(value, (*size, *tail))
+    made = np.asarray(resolved.brdf.coefficients(values), np.float32)
+    padded = np.zeros((*made.shape[:-2], TERMS, 3), np.float32)
+    padded[..., : made.shape[-2], :] = made
+    return padded
+
+
+def _numeric(value: Value) -> bool:
+    return not isinstance(value, str | bool)
+
+
+def linear(image: Image) -> npt.NDArray[np.float32]:
+    """(H, W, C) scene-linear float32 (alpha untouched)."""
+    pixels = image.pixels
+    if pixels.dtype == np.uint8:
+        ramp = np.arange(256, dtype=np.float64) / 255
+        if image.encoding == "srgb":
+            decoded = np.where(ramp <= 0.04045, ramp / 12.92, ((ramp + 0.055) / 1.055) ** 2.4)
+            made = decoded.astype(np.float32)[pixels]
+            if pixels.shape[2] == 4:
+                made[..., 3] = ramp.astype(np.float32)[pixels[..., 3]]
+            return made
+        return ramp.astype(np.float32)[pixels]
+    if image.encoding == "srgb":
+        made = np.where(pixels <= 0.04045, pixels / 12.92, ((np.maximum(pixels, 0.0) + 0.055) / 1.055) ** 2.4)
+        if pixels.shape[2] == 4:
+            made[..., 3] = pixels[..., 3]
+        return made.astype(np.float32)
+    return pixels
+
+
+__all__ = ["Resolved", "coefficients", "linear", "resolve", "same_shapes", "shapes"]

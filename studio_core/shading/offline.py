@@ -1,0 +1,76 @@
+"""Shading without a window: one call from a scene to radiance or a picture."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from studio_core.contract import Services, ShadingBackend
+from studio_core.errors import EditError
+from studio_core.params import build, param_infos, parse
+from studio_core.raster import PictureStage
+from studio_core.scene.diff import Changes
+from studio_core.scene.nodes import Camera, MeshObject, Scene
+from studio_core.session import View, framing
+from studio_core.shading.artifacts import Picture, Radiance
+from studio_core.shading.frame import Frame
+from studio_core.shading.job import Job
+from studio_core.shading.pipeline import Pipeline
+
+
+def backend_params(backend: ShadingBackend, values: Mapping[str, object]) -> Any:
+    """The backend's parameters; texts (from the command line) are parsed, names and ranges checked."""
+    infos = param_infos(backend.Params)
+    parsed = {n: parse(n, infos[n], v) if isinstance(v, str) and n in infos else v for n, v in values.items()}
+    return build(backend.Params, parsed)
+
+
+def scene_view(scene: Scene, camera: str | None, width: int, height: int) -> View:
+    """What the named camera sees; without a name the first camera, or a view that frames everything."""
+    if camera is not None:
+        node = scene.named(camera)
+        if not isinstance(node, Camera):
+            raise EditError(f"{camera!r} is no camera")
+        return View.of(node, scene, width, height)
+    first = next(scene.of(Camera), None)
+    if first is not None:
+        return View.of(first, scene, width, height)
+    low, high = scene_bounds(scene)
+    return framing(low, high, View(width=width, height=height))
+
+
+def scene_bounds(scene: Scene) -> tuple[Any, Any]:
+    """Lowest and highest corner of all shown meshes, (3,) each; a unit box when there are none."""
+    corners = []
+    for node in scene.of(MeshObject):
+        if scene.shown(node.id) and len(node.geometry.positions):
+            matrix = scene.world(node.id).matrix()
+            low, high = node.geometry.bounds
+            box = np.array(
+                [[x, y, z] for x in (low[0], high[0]) for y in (low[1], high[1]) for z in (low[2], high[2])]
+            )
+            corners.append(box @ matrix[:3, :3].T + matrix[:3, 3])
+    if not corners:
+        return np.array([-0.5, 0.0, -0.5]), np.array([0.5, 1.0, 0.5])
+    points = np.concatenate(corners)
+    return points.min(axis=0), points.max(axis=0)
+
+
+def shade(
+    scene: Scene, view: View, backend: ShadingBackend, params: Any, services: Services, job: Job | None = None
+) -> Radiance:
+    """Radiance at the shading vertices."""
+    pipeline = Pipeline(backend.stages(services))
+    made: Radiance = pipeline.update(Frame(scene, view, params, 1), Changes(), job or Job("Shading"))
+    return made
+
+
+def picture(
+    scene: Scene, view: View, backend: ShadingBackend, params: Any, services: Services, job: Job | None = None
+) -> Picture:
+    """The picture that `view` sees, scene-linear."""
+    pipeline = Pipeline([*backend.stages(services), PictureStage(services)])
+    made: Picture = pipeline.update(Frame(scene, view, params, 1), Changes(), job or Job("Rendering"))
+    return made

@@ -1,0 +1,265 @@
+"""The stages every backend shares: surfaces, ray casters, BRDF shapes, lights, what the camera sees."""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from studio_core.contract import Services
+from studio_core.kernels.directions import direction_set
+from studio_core.kernels.light_tree import LightTree, integrate_environment
+from studio_core.kernels.raycast import CasterObject, RayCaster
+from studio_core.params import param
+from studio_core.scene.diff import Aspect
+from studio_core.scene.nodes import Environment, MeshObject, Scene
+from studio_core.scene.world_mesh import WorldMesh, world_mesh
+from studio_core.session import View
+from studio_core.shading.artifacts import Casters, Hits, Lighting, Shapes, Surfaces
+from studio_core.shading.frame import Frame
+from studio_core.shading.job import Job
+from studio_core.shading.lamps import lamps
+from studio_core.shading.materials import same_shapes, shapes
+from studio_core.shading.pipeline import Inputs
+
+BODIES = Aspect.STRUCTURE | Aspect.GEOMETRY
+LAYERS = 6  # most transparent surfaces looked through
+FINEST = 15  # direction sets up to 2^15 share one integration of the environment
+
+
+@dataclass(frozen=True)
+class SurfaceParams:
+    """Parameters that every backend over shading vertices has."""
+
+    vertices: int = param(
+        30_000,
+        "Shading vertices",
+        "How many points the whole scene is lit at; more shows finer shadow edges",
+        low=500,
+        high=5_000_000,
+        scale="log",
+    )
+
+
+class SurfaceStage:
+    """Shading meshes of all shown objects, in the world."""
+
+    needs: tuple[type, ...] = ()
+    gives = Surfaces
+    dirtied_by = BODIES | Aspect.TRANSFORM | Aspect.QUALITY
+
+    def run(self, frame: Frame, inputs: Inputs, job: Job) -> Surfaces:
+        """Only what moved is transformed again when nothing else changed."""
+        scene = frame.scene
+        objects = [node for node in scene.of(MeshObject) if scene.shown(node.id)]
+        nodes = tuple(node.id for node in objects)
+        budget = int(getattr(frame.params, "vertices", 30_000))
+        old: Surfaces | None = inputs.previous
+        if old is None or inputs.changes.aspects & BODIES or old.budget != budget or old.nodes != nodes:
+            return self._build(scene, objects, budget, old.mesh if old else None)
+        mesh = old.mesh
+        for node_id in inputs.changes.of(Aspect.TRANSFORM):
+            if node_id in nodes:
+                mesh = mesh.moved(nodes.index(node_id), scene.world(node_id))
+        return old if mesh is old.mesh else dataclasses.replace(old, mesh=mesh)
+
+    def _build(
+        self,
+        scene: Scene,
+        objects: list[MeshObject],
+        nodes: tuple[str, ...],
+        budget: int,
+        old: WorldMesh | None,
+    ) -> Surfaces:
+        table: dict[str, int] = {}
+        items = []
+        for node in objects:
+            slots = [table.setdefault(material, len(table)) for material in node.materials]
+            items.append((node.id, node.geometry, scene.world(node.id), slots))
+        mesh = world_mesh(items, budget=budget, previous=old)
+        opacity = np.array([scene.material(material).opacity for material in table], np.float32)
+        return Surfaces(tuple(node.id for node in objects), tuple(table), mesh, opacity, budget)
+
+
+class CasterStage:
+    """Ray casters; objects that only moved keep theirs."""
+
+    needs: tuple[type, ...] = (Surfaces,)
+    gives = Casters
+    dirtied_by = BODIES | Aspect.TRANSFORM
+
+    def run(self, frame: Frame, inputs: Inputs, job: Job) -> Casters:
+        """Built anew only when the set of meshes changed."""
+        surfaces, scene = inputs[Surfaces], frame.scene
+        objects = [node for node in map(scene.__getitem__, surfaces.nodes) if isinstance(node, MeshObject)]
+        opaque = [tuple(scene.material(m).casts_shadow for m in node.materials) for node in objects]
+        meshes = tuple(
+            (node.geometry.key, part.key, stops)
+            for node, part, stops in zip(objects, surfaces.mesh.parts, opaque, strict=True)
+        )
+        transforms = tuple(scene.world(node) for node in surfaces.nodes)
+        previous: Casters | None = inputs.previous
+        if previous is not None and previous.meshes == meshes:
+            for index, (now, before) in enumerate(zip(transforms, previous.transforms, strict=True)):
+                if now != before:
+                    previous.shadow.move(index, now.matrix())
+                    previous.primary.move(index, now.matrix())
+            return dataclasses.replace(previous, transforms=transforms)
+        shadow, primary = [], []
+        for node, part, stops, transform in zip(
+            objects, surfaces.mesh.parts, opaque, transforms, strict=True
+        ):
+            mesh, matrix = node.geometry, transform.matrix()
+            faces = np.array(stops)[mesh.slots]
+            shadow.append(CasterObject(mesh.positions, mesh.faces, f"{mesh.key}{stops}", matrix, faces))
+            primary.append(CasterObject(part.positions, part.faces, part.key, matrix, None))
+        job.checkpoint()
+        lend = (previous.shadow, previous.primary) if previous is not None else (None, None)
+        casters = (RayCaster(shadow, previous=lend[0]), RayCaster(primary, previous=lend[1]))
+        return Casters(*casters, meshes, transforms)
+
+
+class ShapeStage:
+    """BRDF kernels and their parameters; a change of colour alone gives the previous one back."""
+
+    needs: tuple[type, ...] = (Surfaces,)
+    gives = Shapes
+    dirtied_by = Aspect.MATERIAL | BODIES
+
+    def __init__(self, services: Services) -> None:
+        self._registry = services.registry
+
+    def run(self, frame: Frame, inputs: Inputs, job: Job) -> Shapes:
+        """The table for the materials of `Surfaces`."""
+        made = shapes(frame.scene, inputs[Surfaces].materials, self._registry)
+        previous: Shapes | None = inputs.previous
+        if previous is not None and same_shapes(previous, made) and previous.problems == made.problems:
+            return previous
+        return made
+
+
+class LightingStage:
+    """The environment integrated over the finest leaves, and all lamps, at unit gain."""
+
+    needs: tuple[type, ...] = ()
+    gives = Lighting
+    dirtied_by = Aspect.LIGHT | Aspect.QUALITY
+
+    def __init__(self, services: Services) -> None:
+        self._workers = services.workers
+
+    def run(self, frame: Frame, inputs: Inputs, job: Job) -> Lighting:
+        """Integrates again only for another picture, rotation or finer directions."""
+        scene = frame.scene
+        found = (node for node in scene.of(Environment) if scene.shown(node.id))
+        environment = next(found, None)
+        tree: LightTree | None = None
+        key: object = None
+        if environment is not None:
+            wanted = int(getattr(frame.params, "directions", 1 << FINEST)).bit_length() - 1
+            level = max(wanted, FINEST)
+            key = (environment.image.key, environment.azimuth, environment.tilt, level)
+            previous: Lighting | None = inputs.previous
+            if previous is not None and previous.integrated == key:
+                tree = previous.tree
+            else:
+                rotation = environment.rotation().matrix()[:3, :3]
+                pixels = environment.image.pixels[..., :3]
+                leaves = integrate_environment(pixels, rotation, level, self._workers, job)
+                tree = LightTree(direction_set(level), leaves)
+        return Lighting(environment, tree, lamps(scene), key)
+
+
+class PrimaryStage:
+    """What the camera sees at every sample of the picture."""
+
+    needs: tuple[type, ...] = (Surfaces, Casters)
+    gives = Hits
+    dirtied_by = Aspect.VIEW
+
+    def __init__(self, services: Services) -> None:
+        self._workers = services.workers
+
+    def run(self, frame: Frame, inputs: Inputs, job: Job) -> Hits:
+        """Primary rays, followed on through transparent surfaces."""
+        surfaces, caster = inputs[Surfaces], inputs[Casters].primary
+        directions = sample_directions(frame.view)
+        origins = np.broadcast_to(np.asarray(frame.view.transform.translation, np.float64), directions.shape)
+        return self._look(frame.view, surfaces, caster, origins, directions, 0, job)
+
+    def _look(
+        self,
+        view: View,
+        surfaces: Surfaces,
+        caster: RayCaster,
+        origins: npt.NDArray[np.float64],
+        directions: npt.NDArray[np.float32],
+        depth: int,
+        job: Job,
+    ) -> Hits:
+        job.checkpoint()
+        found = caster.closest(origins, directions, 0.0, np.inf, self._workers, job)
+        mesh = surfaces.mesh
+        hit = found.object >= 0
+        face = np.full(len(directions), -1, np.int32)
+        face[hit] = mesh.face_offset[found.object[hit]] + found.face[hit]
+        behind: tuple[tuple[npt.NDArray[np.int64], Hits], ...] = ()
+        if depth < LAYERS and (surfaces.opacity < 1).any():
+            slot = mesh.material[mesh.faces[np.maximum(face, 0), 0]]
+            through = np.flatnonzero(hit & (surfaces.opacity[slot] < 1))
+            if len(through):
+                gone = found.t[through].astype(np.float64) * (1 + 1e-5) + caster.epsilon
+                beyond = origins[through] + gone[:, None] * directions[through]
+                rest = self._look(view, surfaces, caster, beyond, directions[through], depth + 1, job)
+                behind = ((through, _farther(rest, gone.astype(np.float32))),)
+        return Hits(view, view.antialias, face, found.u, found.v, found.t, behind)
+
+
+def _farther(hits: Hits, gone: npt.NDArray[np.float32]) -> Hits:
+    return dataclasses.replace(hits, distance=hits.distance + gone)
+
+
+def sample_directions(view: View) -> npt.NDArray[np.float32]:
+    """(H·W·n², 3) unit world directions: pixels row by row from the top left, n×n samples in each."""
+    n = view.antialias
+    top = np.tan(np.radians(view.fov) / 2)
+    right = top * view.width / view.height
+    x = (np.arange(view.width * n) + 0.5) / (view.width * n) * 2 - 1
+    y = 1 - (np.arange(view.height * n) + 0.5) / (view.height * n) * 2
+    grid = np.empty((view.height, n, view.width, n, 3), np.float64)
+    grid[..., 0] = (x * right).reshape(1, 1, view.width, n)
+    grid[..., 1] = (y * top).reshape(view.height, n, 1, 1)
+    grid[..., 2] = -1
+    flat = grid.transpose(0, 2, 1, 3, 4).reshape(-1, 3)
+    flat /= np.linalg.norm(flat, axis=1, keepdims=True)
+    rotation = view.transform.matrix()[:3, :3] / view.transform.scale
+    return (flat @ rotation.T).astype(np.float32)
+
+
+def visible_vertices(surfaces: Surfaces, hits: Hits) -> npt.NDArray[np.bool_]:
+    """(V,) the corners of every face that a sample sees, on the side it sees."""
+    seen = np.zeros(len(surfaces.mesh.positions), np.bool_)
+    faces = np.unique(hits.face[hits.face >= 0])
+    seen[surfaces.mesh.faces[faces]] = True
+    back = surfaces.mesh.back_faces[faces]
+    seen[back[back[:, 0] != NO_FACE]] = True
+    for _, rest in hits.behind:
+        seen |= visible_vertices(surfaces, rest)
+    return seen
+
+
+NO_FACE = np.uint32(0xFFFFFFFF)
+
+
+def common_stages(services: Services) -> list[Any]:
+    """Surfaces, casters, shapes, lighting, hits: the first stages of every backend."""
+    return [
+        SurfaceStage(),
+        CasterStage(),
+        ShapeStage(services),
+        LightingStage(services),
+        PrimaryStage(services),
+    ]
