@@ -1,0 +1,1 @@
+"""The application: composition root, command line, settings, benchmarks."""

@@ -1,0 +1,187 @@
+"""`lucarne new`: a scene from mesh files, an environment, a floor, materials and a camera."""
+
+from __future__ import annotations
+
+import argparse
+import dataclasses
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from studio_core.contract import ImportedModel, Registry
+from studio_core.edits import Add
+from studio_core.errors import InputError
+from studio_core.params import check, param_infos, parse
+from studio_core.scene.geometry import Geometry
+from studio_core.scene.nodes import Camera, Environment, Material, MeshObject, Scene, new_id
+from studio_core.scene.transform import Transform, axis_angle, looking
+from studio_core.session import View
+from studio_core.shading.offline import scene_view
+
+UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254}
+
+
+@dataclass(frozen=True)
+class MeshRequest:
+    """FILE[@x,y,z[,degrees_y[,scale]]]."""
+
+    path: Path
+    transform: Transform
+
+    @classmethod
+    def parse(cls, text: str) -> MeshRequest:
+        """From the command line's text; a file may have @ in its name as long as numbers follow the last."""
+        path, at, numbers = text.rpartition("@")
+        if not at:
+            return cls(Path(text), Transform())
+        parts = _numbers("--mesh", numbers)
+        if not 3 <= len(parts) <= 5:
+            raise InputError(f"--mesh {text!r}: after @ come x,y,z[,degrees[,scale]]")
+        degrees = parts[3] if len(parts) > 3 else 0.0
+        scale = parts[4] if len(parts) > 4 else 1.0
+        if scale <= 0:
+            raise InputError(f"--mesh {text!r}: the scale must be positive")
+        place = (parts[0], parts[1], parts[2])
+        return cls(Path(path), Transform(place, axis_angle((0, 1, 0), degrees), scale))
+
+
+def _numbers(option: str, text: str) -> list[float]:
+    try:
+        parts = [float(part) for part in text.split(",")]
+    except ValueError:
+        raise InputError(f"{option} {text!r}: expected numbers separated by commas") from None
+    if not all(math.isfinite(part) for part in parts):
+        raise InputError(f"{option} {text!r}: expected finite numbers")
+    return parts
+
+
+def parse_camera(text: str) -> tuple[Transform, float, float]:
+    """Transform, fov and focus from `from=x,y,z:to=x,y,z:fov=deg`."""
+    given: dict[str, list[float]] = {}
+    for part in text.split(":"):
+        name, _, numbers = part.partition("=")
+        if name not in ("from", "to", "fov"):
+            raise InputError(f"--camera {text!r}: write from=x,y,z:to=x,y,z:fov=degrees")
+        given[name] = _numbers("--camera", numbers)
+    eye, target, fov = given.get("from", []), given.get("to", []), given.get("fov", [45.0])
+    if len(eye) != 3 or len(target) != 3 or len(fov) != 1:
+        raise InputError(f"--camera {text!r}: write from=x,y,z:to=x,y,z:fov=degrees")
+    check("fov", param_infos(Camera)["fov"], fov[0])
+    try:
+        transform = looking(eye, target)
+    except ValueError as error:
+        raise InputError(f"--camera {text!r}: {error}") from None
+    return transform, fov[0], float(np.linalg.norm(np.subtract(eye, target)))
+
+
+def load_model(path: Path, registry: Registry, unit: float = 1.0) -> ImportedModel:
+    """Read a model by its extension; InputError when no importer knows it."""
+    suffix = path.suffix.lower()
+    known: list[str] = []
+    for name in registry.names("importer"):
+        importer = registry.get("importer", name)
+        known.extend(importer.extensions)
+        if suffix in importer.extensions:
+            model: ImportedModel = importer.load(path, unit)
+            return model
+    raise InputError(f"{path}: files of this kind cannot be read (known: {', '.join(sorted(known))})")
+
+
+def floor(size: float) -> tuple[MeshObject, Material]:
+    """A square floor at y = 0, facing up, textured once a metre."""
+    half = size / 2
+    positions = np.array([[-half, 0, half], [half, 0, half], [half, 0, -half], [-half, 0, -half]], np.float32)
+    uvs = np.array([[0, 0], [size, 0], [size, size], [0, size]], np.float32)
+    normals = np.tile(np.array([0, 1, 0], np.float32), (4, 1))
+    geometry = Geometry(positions, np.array([[0, 1, 2], [0, 2, 3]], np.uint32), normals, uvs)
+    material = Material(
+        id=new_id("material"), name="Floor", model="lambert", values={"base_color": (0.5, 0.5, 0.5)}
+    )
+    return MeshObject(id=new_id("mesh"), name="Floor", geometry=geometry, materials=(material.id,)), material
+
+
+def set_material(scene: Scene, text: str, registry: Registry) -> Scene:
+    """The scene after NODE=KIND:key=value,…; the named node and all under it get the new material."""
+    name, _, rest = text.partition("=")
+    kind, _, settings = rest.partition(":")
+    brdf = registry.brdf(kind)
+    infos = param_infos(brdf.Params)
+    values = {}
+    for setting in filter(None, settings.split(",")):
+        key, equals, value = setting.partition("=")
+        if not equals or key not in infos:
+            known = ", ".join(infos)
+            raise InputError(f"--material {text!r}: {kind} has no parameter {key!r} (known: {known})")
+        values[key] = parse(key, infos[key], value)
+    top = scene.named(name)
+    material = Material(id=new_id("material"), name=f"{top.name} {kind}", model=kind, values=values)
+    under = [scene[node] for node in scene.subtree(top.id)]
+    changed = [
+        dataclasses.replace(node, materials=(material.id,) * len(node.materials))
+        for node in under
+        if isinstance(node, MeshObject)
+    ]
+    if not changed:
+        raise InputError(f"--material {text!r}: {top.name!r} has no mesh")
+    return scene.with_materials(material).with_nodes(*changed)
+
+
+def build(options: argparse.Namespace, registry: Registry) -> tuple[Scene, list[str]]:
+    """The scene that the options of `lucarne new` describe, and notes in sentences."""
+    scene, notes = Scene(), []
+    for text in options.mesh:
+        request = MeshRequest.parse(text)
+        model = load_model(request.path, registry, UNITS[options.unit])
+        notes += [f"{request.path.name}: {note}" for note in model.notes]
+        scene = place(scene, model, request.transform)
+    if options.floor is not None:
+        if not 0 < options.floor <= 1e4:
+            raise InputError("--floor: expected a size over 0 and at most 10000 metres")
+        node, material = floor(options.floor)
+        scene = Add((node,), (material,))(scene)
+    if options.env is not None:
+        from studio_core.imaging.environment import load_environment
+
+        image, found = load_environment(options.env)
+        notes += [f"{options.env.name}: {note}" for note in found]
+        scene = scene.with_nodes(Environment(id=new_id("environment"), name=options.env.stem, image=image))
+    for text in options.material:
+        scene = set_material(scene, text, registry)
+    return scene.with_nodes(*cameras(scene, options.camera)), notes
+
+
+def place(scene: Scene, model: ImportedModel, transform: Transform) -> Scene:
+    """The scene with a model's top nodes moved by `transform`; a taken name gets a number."""
+    taken = {node.name for node in scene.nodes.values()}
+    nodes = []
+    for node in model.nodes:
+        if node.parent is None:
+            name, number = node.name, 2
+            while name in taken:
+                name, number = f"{node.name} {number}", number + 1
+            taken.add(name)
+            node = dataclasses.replace(node, name=name, transform=transform @ node.transform)
+        nodes.append(node)
+    return Add(tuple(nodes), model.materials)(scene)
+
+
+def cameras(scene: Scene, texts: Sequence[str]) -> list[Camera]:
+    """One camera a text, or one that frames the scene."""
+    if texts:
+        made = [parse_camera(text) for text in texts]
+    else:
+        view: View = scene_view(scene, None, 960, 540)
+        made = [(view.transform, view.fov, view.focus)]
+    return [
+        Camera(
+            id=new_id("camera"),
+            name="Camera" if index == 0 else f"Camera {index + 1}",
+            transform=transform,
+            fov=fov,
+            focus=focus,
+        )
+        for index, (transform, fov, focus) in enumerate(made)
+    ]

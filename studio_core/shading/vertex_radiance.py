@@ -1,0 +1,45 @@
+"""Radiance at shading vertices: light sums with their materials' coefficients."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from studio_core.contract import Registry
+from studio_core.scene.nodes import Light, Scene
+from studio_core.shading.artifacts import TERMS, Radiance
+from studio_core.shading.materials import coefficients, resolve
+
+
+def vertex_radiance(scene: Scene, radiance: Radiance, registry: Registry) -> npt.NDArray[np.float32]:
+    """(V, 3) towards the view, with gains; textures are read at the vertices."""
+    lights = {light.id: light for light in scene.of(Light) if scene.shown(light.id)}
+    terms, mesh = radiance.combined(lights), radiance.surfaces.mesh
+    made = np.zeros((len(terms), 3), np.float32)
+    for index, material in enumerate(radiance.surfaces.materials):
+        own = np.flatnonzero(mesh.material == index)
+        if not len(own):
+            continue
+        resolved = resolve(scene.material(material), registry)
+        table = coefficients(resolved)
+        if table.ndim == 2:
+            weights = np.broadcast_to(table, (len(own), TERMS, 3))
+        else:
+            texture = next(iter(resolved.textures.values()))
+            uv = mesh.uvs[own] * np.float32(texture.scale) + np.float32(texture.offset)
+            weights = _bilinear(table, uv)
+        made[own] = (terms[own] * weights).sum(axis=1)
+    return made
+
+
+def _bilinear(table: npt.NDArray[np.float32], uv: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:
+    height, width = table.shape[:2]
+    x, y = uv[:, 0] * width - 0.5, uv[:, 1] * height - 0.5
+    x0, y0 = np.floor(x).astype(np.int64), np.floor(y).astype(np.int64)
+    fx, fy = (x - x0)[:, None, None], (y - y0)[:, None, None]
+    x1, y1 = (x0 + 1) % width, (y0 + 1) % height
+    x0, y0 = x0 % width, y0 % height
+    low = table[y0, x0] * (1 - fx) + table[y0, x1] * fx
+    high = table[y1, x0] * (1 - fx) + table[y1, x1] * fx
+    made: npt.NDArray[np.float32] = (low * (1 - fy) + high * fy).astype(np.float32)
+    return made
