@@ -25,11 +25,20 @@ def readonly(array: npt.ArrayLike, dtype: npt.DTypeLike, *tail: int) -> npt.NDAr
         made.ndim != len(tail) or any(t not in (-1, s) for t, s in zip(tail, made.shape, strict=True))
     ):
         raise ValueError(f"expected an array of shape {tail}, got {made.shape}")
-    if made.flags.writeable:
-        if made is array or made.base is not None:
-            made = made.copy()
-        made.flags.writeable = False
+    if _can_change(made) and (made is array or made.base is not None):
+        made = made.copy()
+    made.flags.writeable = False
     return made
+
+
+def _can_change(array: npt.NDArray[Any]) -> bool:
+    """Whether somebody may write to these numbers, through this array or the one that owns them."""
+    owner: object = array
+    while isinstance(owner, np.ndarray):
+        if owner.flags.writeable:
+            return True
+        owner = owner.base
+    return False
 
 
 def frozen_map(items: Mapping[K, V] | None = None) -> Mapping[K, V]:

@@ -91,7 +91,7 @@ def check(name: str, info: ParamInfo, value: object) -> Value:
                 return int(number)
             case _:
                 return _number(info, value)
-    except (ValueError, TypeError) as error:
+    except (ValueError, TypeError, OverflowError) as error:
         raise InputError(f"{name} = {value!r} does not fit: {error}") from None
 
 
