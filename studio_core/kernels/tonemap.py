@@ -54,13 +54,12 @@ def tonemap(
 
 def _film(light: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:
     """Hill's fit, (N, 3) linear Rec.709 to display-linear Rec.709."""
-    clipped: npt.NDArray[np.float32] = np.fmin(np.fmax(light, np.float32(0)), np.float32(1e6))
+    clipped = np.clip(light, np.float32(0), np.float32(1e6))
     x = clipped @ _TO_FILM.T
     bent = (x * (x + np.float32(0.0245786)) - np.float32(0.000090537)) / (
         x * (np.float32(0.983729) * x + np.float32(0.4329510)) + np.float32(0.238081)
     )
-    made: npt.NDArray[np.float32] = bent @ _FROM_FILM.T
-    return made
+    return np.asarray(bent @ _FROM_FILM.T, np.float32)
 
 
 @cache
