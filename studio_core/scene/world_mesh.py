@@ -1,0 +1,225 @@
+"""The shading meshes of a whole scene as one: what kernels and renderers walk over."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections import OrderedDict
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from studio_core.arrays import readonly
+from studio_core.scene.geometry import Geometry
+from studio_core.scene.nodes import NodeId
+from studio_core.scene.normals import Fan
+from studio_core.scene.shading_mesh import CREASE_DEGREES, F32, NO_BACK, U32, ShadingMesh, prepare, shade_mesh
+from studio_core.scene.transform import Transform, rotation_matrix
+
+I32 = npt.NDArray[np.int32]
+NO_MATERIAL = -1
+
+
+class MeshCache:
+    """Shading meshes by geometry and edge, so that instances and versions of a scene share them.
+
+    Keeps up to `capacity` bytes, least recently used first out. Used from one thread at a time.
+    """
+
+    def __init__(self, capacity: int = 512 << 20, crease_degrees: float = CREASE_DEGREES) -> None:
+        self._capacity = capacity
+        self._crease = crease_degrees
+        self._held: OrderedDict[tuple[str, float], Fan | ShadingMesh] = OrderedDict()
+
+    def prepared(self, geometry: Geometry) -> Fan:
+        """The repaired source; `choose_edge` takes this method."""
+        key = (geometry.key, 0.0)
+        found = self._held.get(key)
+        if not isinstance(found, Fan):
+            found = prepare(geometry, self._crease)
+        self._keep(key, found)
+        return found
+
+    def mesh(self, geometry: Geometry, edge: float) -> ShadingMesh:
+        """The shading mesh at a target edge in the geometry's own frame, four digits of it."""
+        edge = float(f"{edge:.4g}")
+        key = (geometry.key, edge)
+        found = self._held.get(key)
+        if not isinstance(found, ShadingMesh):
+            found = shade_mesh(geometry, edge, prepared=self.prepared(geometry))
+        self._keep(key, found)
+        return found
+
+    def _keep(self, key: tuple[str, float], value: Fan | ShadingMesh) -> None:
+        self._held[key] = value
+        self._held.move_to_end(key)
+        while len(self._held) > 1 and sum(held.nbytes for held in self._held.values()) > self._capacity:
+            self._held.popitem(last=False)
+
+
+@dataclass(frozen=True)
+class Placed:
+    """One object of the world mesh. materials[slot] is the scene's number of the slot's material."""
+
+    node: NodeId
+    mesh: ShadingMesh
+    transform: Transform
+    materials: tuple[int, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class WorldMesh:
+    """All objects' shading meshes in the world, relative to `origin` (3,) float64; read-only arrays.
+
+    Per vertex, as in ShadingMesh: positions = world - origin (V, 3), normals, geometric, inset (V, 3), area
+    (V,) in m², uvs (V, 2) (zeros where a mesh has none), side (V,), object (V,) index into `objects`,
+    material (V,) the scene's number or -1. faces and back_faces (F, 3) into the vertices (NO_BACK: none);
+    face_material (F,) the front's. Object i has vertices vertex_offsets[i]:vertex_offsets[i + 1] and
+    likewise faces. World = float64 first, then minus origin, then float32: recentre far scenes by `origin`.
+    """
+
+    objects: tuple[Placed, ...]
+    origin: npt.NDArray[np.float64]
+    positions: F32
+    normals: F32
+    geometric: F32
+    inset: F32
+    area: F32
+    uvs: F32
+    side: npt.NDArray[np.int8]
+    object: I32
+    material: I32
+    faces: U32
+    back_faces: U32
+    face_material: I32
+    vertex_offsets: npt.NDArray[np.int64]
+    face_offsets: npt.NDArray[np.int64]
+
+    def __len__(self) -> int:
+        return len(self.positions)
+
+    def vertices_of(self, index: int) -> slice:
+        """Where an object's vertices lie."""
+        return slice(int(self.vertex_offsets[index]), int(self.vertex_offsets[index + 1]))
+
+    def faces_of(self, index: int) -> slice:
+        """Where an object's faces lie."""
+        return slice(int(self.face_offsets[index]), int(self.face_offsets[index + 1]))
+
+    def index_of(self, node: NodeId) -> int:
+        """The object made from a node; KeyError when there is none."""
+        for index, placed in enumerate(self.objects):
+            if placed.node == node:
+                return index
+        raise KeyError(node)
+
+    def moved(self, index: int, transform: Transform) -> WorldMesh:
+        """With one object elsewhere. Its mesh stays as finely split as it was; all else is shared."""
+        placed = dataclasses.replace(self.objects[index], transform=transform)
+        objects = (*self.objects[:index], placed, *self.objects[index + 1 :])
+        where = self.vertices_of(index)
+
+        def patched(old: F32, new: F32) -> F32:
+            made = old.copy()
+            made[where] = new
+            return readonly(made, np.float32)
+
+        positions, normals, geometric, inset, area = _placed(placed, self.origin)
+        return dataclasses.replace(
+            self,
+            objects=objects,
+            positions=patched(self.positions, positions),
+            normals=patched(self.normals, normals),
+            geometric=patched(self.geometric, geometric),
+            inset=patched(self.inset, inset),
+            area=patched(self.area, area),
+        )
+
+    def with_mesh(self, index: int, mesh: ShadingMesh) -> WorldMesh:
+        """With another shading mesh (a refined one) for one object; later objects' numbers shift."""
+        placed = dataclasses.replace(self.objects[index], mesh=mesh)
+        return assemble((*self.objects[:index], placed, *self.objects[index + 1 :]), self.origin)
+
+
+def world_mesh(
+    items: Sequence[tuple[NodeId, Geometry, Transform, Sequence[int]]],
+    edge: float,
+    *,
+    origin: npt.ArrayLike = (0.0, 0.0, 0.0),
+    cache: MeshCache | None = None,
+) -> WorldMesh:
+    """The world mesh of (node, geometry, world transform, material number of each slot), edges ≤ `edge` m."""
+    held = cache or MeshCache()
+    return assemble(
+        [
+            Placed(node, held.mesh(geometry, edge / transform.scale), transform, tuple(materials))
+            for node, geometry, transform, materials in items
+        ],
+        origin,
+    )
+
+
+def assemble(objects: Sequence[Placed], origin: npt.ArrayLike = (0.0, 0.0, 0.0)) -> WorldMesh:
+    """Placed meshes concatenated."""
+    centre = readonly(origin, np.float64, 3)
+    parts = [_placed(placed, centre) for placed in objects]
+    meshes = [placed.mesh for placed in objects]
+    vertex = np.concatenate([[0], np.cumsum([len(mesh) for mesh in meshes])]).astype(np.int64)
+    face = np.concatenate([[0], np.cumsum([len(mesh.faces) for mesh in meshes])]).astype(np.int64)
+
+    def joined(arrays: Sequence[npt.NDArray[np.generic]], *tail: int) -> npt.NDArray[np.generic]:
+        return np.concatenate([*arrays]) if len(arrays) else np.zeros((0, *tail))
+
+    def floats(column: int, *tail: int) -> F32:
+        return readonly(joined([part[column] for part in parts], *tail), np.float32)
+
+    def shifted(faces: U32, start: int) -> U32:
+        return np.where(faces == NO_BACK, NO_BACK, faces + np.uint32(start)).astype(np.uint32)
+
+    numbered = list(zip(meshes, vertex[:-1].tolist(), strict=True))
+    uvs = [np.zeros((len(m), 2), np.float32) if m.uvs is None else m.uvs for m in meshes]
+    return WorldMesh(
+        objects=tuple(objects),
+        origin=centre,
+        positions=floats(0, 3),
+        normals=floats(1, 3),
+        geometric=floats(2, 3),
+        inset=floats(3, 3),
+        area=floats(4),
+        uvs=readonly(joined(uvs, 2), np.float32),
+        side=readonly(joined([mesh.side for mesh in meshes]), np.int8),
+        object=readonly(np.repeat(np.arange(len(meshes)), np.diff(vertex)), np.int32),
+        material=readonly(joined([_materials(o, o.mesh.slot) for o in objects]), np.int32),
+        faces=readonly(joined([shifted(m.faces, start) for m, start in numbered], 3), np.uint32),
+        back_faces=readonly(joined([shifted(m.back_faces, start) for m, start in numbered], 3), np.uint32),
+        face_material=readonly(joined([_materials(o, o.mesh.slots) for o in objects]), np.int32),
+        vertex_offsets=readonly(vertex, np.int64),
+        face_offsets=readonly(face, np.int64),
+    )
+
+
+def _placed(placed: Placed, origin: npt.NDArray[np.float64]) -> tuple[F32, F32, F32, F32, F32]:
+    """Positions, normals, geometric, inset and area of one object in the world."""
+    mesh, transform = placed.mesh, placed.transform
+    turn = rotation_matrix(transform.rotation).T
+    shift = np.array(transform.translation) - origin
+    scale = transform.scale
+
+    def turned(vectors: F32, factor: float = 1.0) -> F32:
+        return np.asarray(factor * (vectors.astype(np.float64) @ turn), np.float32)
+
+    positions = scale * (mesh.positions.astype(np.float64) @ turn) + shift
+    return (
+        positions.astype(np.float32),
+        turned(mesh.normals),
+        turned(mesh.geometric),
+        turned(mesh.inset, scale),
+        np.asarray(mesh.area * scale**2, np.float32),
+    )
+
+
+def _materials(placed: Placed, slots: npt.NDArray[np.uint16]) -> I32:
+    """Material number of each slot entry; slots past the last take the last, without materials -1."""
+    table = np.array(placed.materials or (NO_MATERIAL,), np.int32)
+    return np.asarray(table[np.minimum(slots, len(table) - 1)])
