@@ -36,16 +36,21 @@ class Gesture:
     def __init__(self, document: Document, label: str) -> None:
         self.label = label
         self.start = document.scene
-        self.failed = False
         self._document = document
 
     def apply(self, edit: Edit) -> None:
         """Show the scene as it was at the press, changed by `edit`."""
-        self._document._show(edit(self.start))
+        self._show(edit, self.start)
 
     def add(self, edit: Edit) -> None:
         """Change the scene as the gesture has left it."""
-        self._document._show(edit(self._document.scene))
+        self._show(edit, self._document.scene)
+
+    def _show(self, edit: Edit, scene: Scene) -> None:
+        self._document._assert_thread()
+        if self._document._gesture is not self:
+            raise EditError("the gesture is over")
+        self._document._show(edit(scene))
 
 
 class Document:
@@ -164,8 +169,8 @@ class Document:
             raise EditError("the history does not hold that step")
         self._gesture = None
         self._steps, self._costs, self._at = list(steps), [0] * len(steps), position
-        self._show(steps[position].scene)
-        self.saved_scene = self._scene
+        self.saved_scene = steps[position].scene
+        self._show(self.saved_scene)
 
     def mark_saved(self, scene: Scene) -> None:
         """Remember what is in the file."""

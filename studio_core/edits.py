@@ -7,7 +7,7 @@ it does not fit the scene.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Container, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
@@ -54,12 +54,8 @@ class Add:
     label: str = "Add"
 
     def __call__(self, scene: Scene) -> Scene:
-        for node in self.nodes:
-            if node.id in scene.nodes:
-                raise EditError(f"node {node.id!r} is already in the scene")
-        for material in self.materials:
-            if material.id in scene.materials:
-                raise EditError(f"material {material.id!r} is already in the scene")
+        _check_new("node", (node.id for node in self.nodes), scene.nodes)
+        _check_new("material", (material.id for material in self.materials), scene.materials)
         made = scene.with_materials(*self.materials).with_nodes(*self.nodes)
         for node in self.nodes:
             _check_node(made, node)
@@ -301,6 +297,14 @@ def _with_fields(thing: Any, values: Mapping[str, Any]) -> Any:
         except InputError as error:
             raise EditError(str(error)) from None
     return dataclasses.replace(thing, **checked)
+
+
+def _check_new(what: str, ids: Iterable[str], there: Container[str]) -> None:
+    seen: set[str] = set()
+    for ident in ids:
+        if ident in there or ident in seen:
+            raise EditError(f"{what} {ident!r} is already in the scene")
+        seen.add(ident)
 
 
 def _check_node(scene: Scene, node: Node) -> None:

@@ -65,7 +65,7 @@ def little_scene(
     cube_values: Mapping[str, Any] | None = None,
     environment: Image | None = None,
 ) -> Scene:
-    """A cube that stands on a floor under a sky, seen by a camera; ids are `floor`, `cube`, `camera`, `sky`."""
+    """A cube on a floor under a sky, seen by a camera; the ids are `floor`, `cube`, `camera`, `sky`."""
     materials = (
         Material(id="matt", name="Matt", values=frozen_map({"base_color": (0.5, 0.5, 0.5)})),
         Material(id="paint", name="Paint", model=cube_model, values=frozen_map(cube_values)),
@@ -86,7 +86,7 @@ def little_scene(
 
 
 def fingerprint(scene: Scene) -> str:
-    """Hex digest over everything in a scene, order and last bits included; shares no code with the project."""
+    """Hex digest of everything in a scene, order and last bits included; shares no code with the project."""
     digest = hashlib.sha256()
     _feed(digest, scene)
     return digest.hexdigest()

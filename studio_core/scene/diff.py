@@ -92,7 +92,12 @@ def diff(before: Scene, after: Scene) -> Changes:
         old = before.nodes.get(node_id)
         if old is new:
             continue
-        aspect = _added(new) if old is None or type(old) is not type(new) else _node_diff(old, new)
+        if old is None:
+            aspect = _added(new)
+        elif type(old) is not type(new):
+            aspect = _added(old) | _added(new)
+        else:
+            aspect = _node_diff(old, new)
         if aspect:
             nodes[node_id] = aspect
         if aspect & Aspect.TRANSFORM:
