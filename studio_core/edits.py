@@ -13,8 +13,8 @@ from typing import Any, Protocol
 
 from studio_core.arrays import frozen_map
 from studio_core.errors import EditError, InputError
-from studio_core.params import Value, check, param_infos
-from studio_core.scene.geometry import Geometry, Texture
+from studio_core.params import ParamInfo, Value, check, param_infos
+from studio_core.scene.geometry import Geometry, Image, Texture
 from studio_core.scene.nodes import Material, MaterialId, MeshObject, Node, NodeId, Scene, new_id
 from studio_core.scene.transform import Transform
 
@@ -293,10 +293,22 @@ def _with_fields(thing: Any, values: Mapping[str, Any]) -> Any:
         if name not in names:
             raise EditError(f"{thing.name!r} has no property {name!r}")
         try:
-            checked[name] = check(name, infos[name], value) if name in infos else value
+            checked[name] = check(name, infos[name], value) if name in infos else _other(name, value)
         except InputError as error:
             raise EditError(str(error)) from None
     return dataclasses.replace(thing, **checked)
+
+
+_SCALE = ParamInfo("number", "Calibration", low=1e-12, high=1e12)
+
+
+def _other(name: str, value: Any) -> Any:
+    """Fields that no form shows: an environment's picture and calibration."""
+    if name == "luminance_scale" and value is not None:
+        return check(name, _SCALE, value)
+    if name == "image" and not isinstance(value, Image):
+        raise EditError(f"{name} = {value!r} is no picture")
+    return value
 
 
 def _check_new(what: str, ids: Iterable[str], there: Container[str]) -> None:

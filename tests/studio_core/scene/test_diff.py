@@ -6,6 +6,7 @@ The oracle compares what a picture depends on by value: world transforms, who is
 from __future__ import annotations
 
 import dataclasses
+from itertools import pairwise
 from random import Random
 from typing import Any
 
@@ -136,7 +137,7 @@ def test_changes_add_up_to_at_least_the_whole(seed: int, middle: int) -> None:
     scenes = walk(seed, 6)
     whole = diff(scenes[0], scenes[-1])
     summed = Changes()
-    for before, after in zip(scenes, scenes[1:], strict=False):
+    for before, after in pairwise(scenes):
         summed |= diff(before, after)
     assert not whole.aspects & ~summed.aspects & ~Aspect.NAME
     assert whole.materials <= summed.materials
