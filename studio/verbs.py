@@ -35,7 +35,7 @@ def new(options: argparse.Namespace, program: Headless) -> None:
     scene, notes = build(options, program.registry)
     for note in notes:
         program.say(note)
-    save(options.out, scene, label="New")
+    save(options.out, scene, label="New", fresh=True)
     faces = sum(len(node.geometry.faces) for node in scene.nodes.values() if hasattr(node, "geometry"))
     values = {"project": str(options.out), "nodes": len(scene.nodes), "faces": faces, "notes": notes}
     result(options, values, f"{options.out}: {len(scene.nodes)} nodes, {faces} faces")
@@ -98,14 +98,14 @@ def render_scene(
     """Write the picture of a scene; what was done, as values."""
     import dataclasses
 
-    from studio_core.imaging.encode import write_picture
+    from studio_core.imaging.picture import write_picture
     from studio_core.shading.offline import picture, scene_view
 
     width, height = parse_size(options.size)
     view = dataclasses.replace(scene_view(scene, options.camera, width, height), antialias=options.antialias)
     with program.job("Rendering") as job:
         made = picture(scene, view, backend, params, program.services, job)
-    write_picture(options.out, made.linear, exposure=options.exposure, tonemap=options.tonemap)
+    write_picture(options.out, made.linear, exposure=options.exposure, kind=options.tonemap)
     finite = bool(np.isfinite(made.linear).all())
     return {
         "picture": str(options.out),
@@ -163,9 +163,26 @@ def info(options: argparse.Namespace, program: Headless) -> None:
     from studio_core.project.store import info as project_info
 
     found = project_info(options.file)
-    values = found.as_dict()
-    width = max(len(key) for key in values)
-    result(options, values, "\n".join(f"{key:<{width}}  {value}" for key, value in values.items()))
+    revisions = [{"id": r.id, "parent": r.parent, "label": r.label, "time": r.time} for r in found.revisions]
+    values: dict[str, Any] = {
+        "project": str(found.path),
+        "format": found.format,
+        "saved by": found.program,
+        "file bytes": found.file_bytes,
+        "array bytes": found.array_bytes,
+        "arrays": found.arrays,
+        "items": found.items,
+        "undo steps": found.steps,
+        "nodes": dict(found.nodes),
+        "materials": dict(found.materials),
+        "opened by": found.opened_by,
+        "revisions": revisions,
+    }
+    shown = {**values, "opened by": found.opened_by or "nobody", "revisions": len(revisions)}
+    shown |= {
+        key: ", ".join(f"{n} {kind}" for kind, n in values[key].items()) for key in ("nodes", "materials")
+    }
+    result(options, values, "\n".join(f"{key:<12} {value}" for key, value in shown.items()))
 
 
 def export(options: argparse.Namespace, program: Headless) -> None:

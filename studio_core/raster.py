@@ -182,7 +182,7 @@ class _Compositor:
         self.workers.run(len(directions), CHUNK, shade, self.job)
         for index, rest in hits.behind:
             under = self(rest, np.ascontiguousarray(directions[index]))
-            slot = mesh.material[mesh.faces[hits.face[index], 0]]
+            slot = mesh.face_material[hits.face[index]]
             alpha = self.surfaces.opacity[slot][:, None]
             out[index] = alpha * out[index] + (1 - alpha) * under
         return out
@@ -212,7 +212,7 @@ def _texels_per_metre(surfaces: Surfaces, table: Coefficients) -> F32:
     area = np.linalg.norm(cross, axis=1)
     a, b = uvs[:, 1] - uvs[:, 0], uvs[:, 2] - uvs[:, 0]
     uv_area = np.abs(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
-    m = mesh.material[mesh.faces[:, 0]]
+    m = mesh.face_material
     texels = uv_area * table.uv_scale[m, 0] * table.uv_scale[m, 1] * table.size[m, 0, 0] * table.size[m, 0, 1]
     made: F32 = np.sqrt(np.abs(texels) / np.maximum(area, 1e-20)).astype(np.float32)
     return made

@@ -43,7 +43,7 @@ def shade_samples(
     faces: U32,
     back_faces: U32,
     geometric: F32,
-    material: I64,
+    material: I32,
     uvs: F32,
     texels_per_metre: F32,
     terms: F32,

@@ -14,6 +14,7 @@ from studio_core.jit import call_address, kernel
 
 F32 = npt.NDArray[np.float32]
 F64 = npt.NDArray[np.float64]
+I32 = npt.NDArray[np.int32]
 I64 = npt.NDArray[np.int64]
 
 BATCH = 256
@@ -73,7 +74,7 @@ def environment_terms(
     points: I64,
     positions: F32,
     normals: F32,
-    material: I64,
+    material: I32,
     eye: F32,
     bits: npt.NDArray[np.uint64],
     directions: F32,
@@ -167,7 +168,7 @@ def lamp_terms(
     points: I64,
     positions: F32,
     normals: F32,
-    material: I64,
+    material: I32,
     eye: F32,
     to_lamp: F32,
     weight: F32,

@@ -47,7 +47,7 @@ class VisibilityBits:
     def of(self, points: Points, directions: DirectionSet, job: Job) -> npt.NDArray[np.uint64]:
         """(len(points), S/64) words; kept unless all vertices would need over 1 GiB."""
         count, words = len(self._surfaces.mesh.positions), len(directions.directions) // 64
-        level = directions.level
+        level = directions.k
         if count * words * 8 > BITS_LIMIT:
             return self._trace(points, directions, job)
         if level not in self._bits:
@@ -98,7 +98,7 @@ def environment_layer(
     if lighting.tree is None or not len(points):
         return layer
     mesh, directions = surfaces.mesh, direction_set(level)
-    leaves = np.ascontiguousarray(lighting.tree.leaves(level), np.float32)
+    leaves = lighting.tree.coarsened(level).radiance
     local_eye = (eye - mesh.origin).astype(np.float32)
     step = max(POINTS, min(len(points), (64 << 20) // (len(directions.directions) // 8)))
     for first in range(0, len(points), step):

@@ -115,17 +115,19 @@ def linear(image: Image) -> npt.NDArray[np.float32]:
         ramp = np.arange(256, dtype=np.float64) / 255
         if image.encoding == "srgb":
             decoded = np.where(ramp <= 0.04045, ramp / 12.92, ((ramp + 0.055) / 1.055) ** 2.4)
-            made = decoded.astype(np.float32)[pixels]
+            made: npt.NDArray[np.float32] = decoded.astype(np.float32)[pixels]
             if pixels.shape[2] == 4:
                 made[..., 3] = ramp.astype(np.float32)[pixels[..., 3]]
             return made
-        return ramp.astype(np.float32)[pixels]
+        plain: npt.NDArray[np.float32] = ramp.astype(np.float32)[pixels]
+        return plain
     if image.encoding == "srgb":
-        made = np.where(pixels <= 0.04045, pixels / 12.92, ((np.maximum(pixels, 0.0) + 0.055) / 1.055) ** 2.4)
+        bent = np.where(pixels <= 0.04045, pixels / 12.92, ((np.maximum(pixels, 0.0) + 0.055) / 1.055) ** 2.4)
         if pixels.shape[2] == 4:
-            made[..., 3] = pixels[..., 3]
-        return made.astype(np.float32)
-    return pixels
+            bent[..., 3] = pixels[..., 3]
+        return bent.astype(np.float32)
+    straight: npt.NDArray[np.float32] = pixels
+    return straight
 
 
 __all__ = ["Resolved", "coefficients", "linear", "resolve", "same_shapes", "shapes"]

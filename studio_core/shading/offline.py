@@ -5,14 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-import numpy as np
-
 from studio_core.contract import Services, ShadingBackend
 from studio_core.errors import EditError
 from studio_core.params import build, param_infos, parse
 from studio_core.raster import PictureStage
+from studio_core.scene.bounds import scene_bounds
 from studio_core.scene.diff import Changes
-from studio_core.scene.nodes import Camera, MeshObject, Scene
+from studio_core.scene.nodes import Camera, Scene
 from studio_core.session import View, framing
 from studio_core.shading.artifacts import Picture, Radiance
 from studio_core.shading.frame import Frame
@@ -39,23 +38,6 @@ def scene_view(scene: Scene, camera: str | None, width: int, height: int) -> Vie
         return View.of(first, scene, width, height)
     low, high = scene_bounds(scene)
     return framing(low, high, View(width=width, height=height))
-
-
-def scene_bounds(scene: Scene) -> tuple[Any, Any]:
-    """Lowest and highest corner of all shown meshes, (3,) each; a unit box when there are none."""
-    corners = []
-    for node in scene.of(MeshObject):
-        if scene.shown(node.id) and len(node.geometry.positions):
-            matrix = scene.world(node.id).matrix()
-            low, high = node.geometry.bounds
-            box = np.array(
-                [[x, y, z] for x in (low[0], high[0]) for y in (low[1], high[1]) for z in (low[2], high[2])]
-            )
-            corners.append(box @ matrix[:3, :3].T + matrix[:3, 3])
-    if not corners:
-        return np.array([-0.5, 0.0, -0.5]), np.array([0.5, 1.0, 0.5])
-    points = np.concatenate(corners)
-    return points.min(axis=0), points.max(axis=0)
 
 
 def shade(

@@ -38,9 +38,20 @@ class Inputs:
 class Stage(Protocol):
     """Pure: the same frame and inputs give the same artifact; `previous` and `changes` only save work."""
 
-    needs: tuple[type, ...]
-    gives: type
-    dirtied_by: Aspect
+    @property
+    def needs(self) -> tuple[type, ...]:
+        """Artifacts that must be made first."""
+        ...
+
+    @property
+    def gives(self) -> type:
+        """The kind of artifact it makes."""
+        ...
+
+    @property
+    def dirtied_by(self) -> Aspect:
+        """Changes after which it must run again, even if all it needs stayed."""
+        ...
 
     def run(self, frame: Frame, inputs: Inputs, job: Job) -> Any:
         """The artifact, or `inputs.previous` where nothing differs."""

@@ -10,13 +10,14 @@ import numpy as np
 import numpy.typing as npt
 
 from studio_core.contract import Services
-from studio_core.kernels.directions import direction_set
 from studio_core.kernels.light_tree import LightTree, integrate_environment
 from studio_core.kernels.raycast import CasterObject, RayCaster
 from studio_core.params import param
+from studio_core.scene.bounds import scene_bounds
 from studio_core.scene.diff import Aspect
 from studio_core.scene.nodes import Environment, MeshObject, Scene
-from studio_core.scene.world_mesh import WorldMesh, world_mesh
+from studio_core.scene.shading_mesh import BUDGET, NO_BACK, choose_edge
+from studio_core.scene.world_mesh import MeshCache, world_mesh
 from studio_core.session import View
 from studio_core.shading.artifacts import Casters, Hits, Lighting, Shapes, Surfaces
 from studio_core.shading.frame import Frame
@@ -35,7 +36,7 @@ class SurfaceParams:
     """Parameters that every backend over shading vertices has."""
 
     vertices: int = param(
-        30_000,
+        BUDGET,
         "Shading vertices",
         "How many points the whole scene is lit at; more shows finer shadow edges",
         low=500,
@@ -51,35 +52,34 @@ class SurfaceStage:
     gives = Surfaces
     dirtied_by = BODIES | Aspect.TRANSFORM | Aspect.QUALITY
 
+    def __init__(self) -> None:
+        self._cache = MeshCache()
+
     def run(self, frame: Frame, inputs: Inputs, job: Job) -> Surfaces:
         """Only what moved is transformed again when nothing else changed."""
         scene = frame.scene
         objects = [node for node in scene.of(MeshObject) if scene.shown(node.id)]
         nodes = tuple(node.id for node in objects)
-        budget = int(getattr(frame.params, "vertices", 30_000))
+        budget = int(getattr(frame.params, "vertices", BUDGET))
         old: Surfaces | None = inputs.previous
         if old is None or inputs.changes.aspects & BODIES or old.budget != budget or old.nodes != nodes:
-            return self._build(scene, objects, budget, old.mesh if old else None)
+            return self._build(scene, objects, budget)
         mesh = old.mesh
         for node_id in inputs.changes.of(Aspect.TRANSFORM):
             if node_id in nodes:
                 mesh = mesh.moved(nodes.index(node_id), scene.world(node_id))
         return old if mesh is old.mesh else dataclasses.replace(old, mesh=mesh)
 
-    def _build(
-        self,
-        scene: Scene,
-        objects: list[MeshObject],
-        nodes: tuple[str, ...],
-        budget: int,
-        old: WorldMesh | None,
-    ) -> Surfaces:
+    def _build(self, scene: Scene, objects: list[MeshObject], budget: int) -> Surfaces:
         table: dict[str, int] = {}
         items = []
         for node in objects:
             slots = [table.setdefault(material, len(table)) for material in node.materials]
             items.append((node.id, node.geometry, scene.world(node.id), slots))
-        mesh = world_mesh(items, budget=budget, previous=old)
+        sizes = [(geometry, world.scale) for _, geometry, world, _ in items]
+        edge = choose_edge(sizes, budget, prepared=self._cache.prepared)
+        low, high = scene_bounds(scene)
+        mesh = world_mesh(items, edge, origin=np.round((low + high) / 2), cache=self._cache)
         opacity = np.array([scene.material(material).opacity for material in table], np.float32)
         return Surfaces(tuple(node.id for node in objects), tuple(table), mesh, opacity, budget)
 
@@ -96,10 +96,9 @@ class CasterStage:
         surfaces, scene = inputs[Surfaces], frame.scene
         objects = [node for node in map(scene.__getitem__, surfaces.nodes) if isinstance(node, MeshObject)]
         opaque = [tuple(scene.material(m).casts_shadow for m in node.materials) for node in objects]
-        meshes = tuple(
-            (node.geometry.key, part.key, stops)
-            for node, part, stops in zip(objects, surfaces.mesh.parts, opaque, strict=True)
-        )
+        parts = [placed.mesh for placed in surfaces.mesh.objects]
+        keys = [f"{n.geometry.key} {p.edge} {len(p)}" for n, p in zip(objects, parts, strict=True)]
+        meshes = tuple(zip(keys, opaque, strict=True))
         transforms = tuple(scene.world(node) for node in surfaces.nodes)
         previous: Casters | None = inputs.previous
         if previous is not None and previous.meshes == meshes:
@@ -109,13 +108,11 @@ class CasterStage:
                     previous.primary.move(index, now.matrix())
             return dataclasses.replace(previous, transforms=transforms)
         shadow, primary = [], []
-        for node, part, stops, transform in zip(
-            objects, surfaces.mesh.parts, opaque, transforms, strict=True
-        ):
+        for node, part, key, stops, transform in zip(objects, parts, keys, opaque, transforms, strict=True):
             mesh, matrix = node.geometry, transform.matrix()
             faces = np.array(stops)[mesh.slots]
-            shadow.append(CasterObject(mesh.positions, mesh.faces, f"{mesh.key}{stops}", matrix, faces))
-            primary.append(CasterObject(part.positions, part.faces, part.key, matrix, None))
+            shadow.append(CasterObject(mesh.positions, mesh.faces, mesh.key, matrix, faces))
+            primary.append(CasterObject(part.positions, part.faces, key, matrix, None))
         job.checkpoint()
         lend = (previous.shadow, previous.primary) if previous is not None else (None, None)
         casters = (RayCaster(shadow, previous=lend[0]), RayCaster(primary, previous=lend[1]))
@@ -169,7 +166,7 @@ class LightingStage:
                 rotation = environment.rotation().matrix()[:3, :3]
                 pixels = environment.image.pixels[..., :3]
                 leaves = integrate_environment(pixels, rotation, level, self._workers, job)
-                tree = LightTree(direction_set(level), leaves)
+                tree = LightTree.build(leaves)
         return Lighting(environment, tree, lamps(scene), key)
 
 
@@ -205,10 +202,10 @@ class PrimaryStage:
         mesh = surfaces.mesh
         hit = found.object >= 0
         face = np.full(len(directions), -1, np.int32)
-        face[hit] = mesh.face_offset[found.object[hit]] + found.face[hit]
+        face[hit] = mesh.face_offsets[found.object[hit]] + found.face[hit]
         behind: tuple[tuple[npt.NDArray[np.int64], Hits], ...] = ()
         if depth < LAYERS and (surfaces.opacity < 1).any():
-            slot = mesh.material[mesh.faces[np.maximum(face, 0), 0]]
+            slot = mesh.face_material[np.maximum(face, 0)]
             through = np.flatnonzero(hit & (surfaces.opacity[slot] < 1))
             if len(through):
                 gone = found.t[through].astype(np.float64) * (1 + 1e-5) + caster.epsilon
@@ -245,13 +242,10 @@ def visible_vertices(surfaces: Surfaces, hits: Hits) -> npt.NDArray[np.bool_]:
     faces = np.unique(hits.face[hits.face >= 0])
     seen[surfaces.mesh.faces[faces]] = True
     back = surfaces.mesh.back_faces[faces]
-    seen[back[back[:, 0] != NO_FACE]] = True
+    seen[back[back[:, 0] != NO_BACK]] = True
     for _, rest in hits.behind:
         seen |= visible_vertices(surfaces, rest)
     return seen
-
-
-NO_FACE = np.uint32(0xFFFFFFFF)
 
 
 def common_stages(services: Services) -> list[Any]:

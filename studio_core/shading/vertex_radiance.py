@@ -26,7 +26,7 @@ def vertex_radiance(scene: Scene, radiance: Radiance, registry: Registry) -> npt
             weights = np.broadcast_to(table, (len(own), TERMS, 3))
         else:
             texture = next(iter(resolved.textures.values()))
-            uv = mesh.uvs[own] * np.float32(texture.scale) + np.float32(texture.offset)
+            uv = mesh.uvs[own] * np.array(texture.scale, np.float32) + np.array(texture.offset, np.float32)
             weights = _bilinear(table, uv)
         made[own] = (terms[own] * weights).sum(axis=1)
     return made
