@@ -1,0 +1,1 @@
+"""A furnished living room by daylight."""

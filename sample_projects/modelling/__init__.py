@@ -1,0 +1,1 @@
+"""What all samples are made with: meshes, shapes, sky, light from all around, textures."""

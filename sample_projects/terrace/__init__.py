@@ -1,0 +1,1 @@
+"""A terrace under a sunny sky."""
