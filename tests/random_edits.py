@@ -196,7 +196,7 @@ def _set_texture(dice: Dice) -> Edit:
 
 def _compound(dice: Dice) -> Edit:
     first = edits.Add((Group(id=f"{dice.fresh}-a"),))
-    then = dataclasses.replace(dice, scene=first(dice.scene))
+    then = dataclasses.replace(dice, scene=first(dice.scene), fresh=f"{dice.fresh}c")
     return edits.Compound("Both", (first, dice.rng.choice(MAKERS)(then)))
 
 
