@@ -204,11 +204,11 @@ def scene_digest(scene: Scene) -> str:
     Cheap to ask again: items that live on between scenes are not hashed twice. ProjectError when the scene
     holds what a project file cannot (a number that is not finite, an unknown class).
     """
-    return _digests(scene)
+    return known_digest(scene)
 
 
 # What follows remembers pure results for as long as the values live; nothing else is shared.
 geometry_refs: Memo[dict[str, ArrayRef]] = Memo(_geometry_refs)
 image_ref: Memo[ArrayRef] = Memo(_image_ref)
 item_hash: Memo[str] = Memo(lambda item: text_hash(encode_item(item)[0]))
-_digests: Memo[str] = Memo(lambda scene: scene_form(scene).digest)
+known_digest: Memo[str] = Memo(lambda scene: scene_form(scene).digest)

@@ -22,12 +22,21 @@ class Memo(Generic[T]):
 
     def __call__(self, obj: object) -> T:
         """`make(obj)`, computed once."""
-        key = id(obj)
-        found = self._known.get(key)
+        found = self._known.get(id(obj))
         if found is not None and found[0]() is obj:
             return found[1]
         made = self._make(obj)
-        known = self._known
+        self.remember(obj, made)
+        return made
+
+    def known(self, obj: object) -> T | None:
+        """What is remembered of `obj`."""
+        found = self._known.get(id(obj))
+        return found[1] if found is not None and found[0]() is obj else None
+
+    def remember(self, obj: object, made: T) -> None:
+        """Take `made`, computed elsewhere, for `make(obj)`."""
+        key, known = id(obj), self._known
 
         def forget(dead: weakref.ref[Any]) -> None:
             entry = known.get(key)
@@ -35,7 +44,6 @@ class Memo(Generic[T]):
                 del known[key]
 
         known[key] = (weakref.ref(obj, forget), made)
-        return made
 
     def __len__(self) -> int:
         return len(self._known)

@@ -14,7 +14,7 @@ from studio_core.errors import ProjectError
 from studio_core.project.blobs import is_hash
 from studio_core.project.canonical import dumps, text_hash
 
-CUT_BELOW = 8
+CUT_BELOW = "08"
 SHORTEST, LONGEST = 2, 256
 MAX_LEVEL = 12
 MAX_ENTRIES = 1_000_000
@@ -43,7 +43,7 @@ def _groups(row: list[str]) -> list[list[str]]:
     group: list[str] = []
     for entry in row:
         group.append(entry)
-        if len(group) == LONGEST or (len(group) >= SHORTEST and int(entry[:2], 16) < CUT_BELOW):
+        if len(group) == LONGEST or (len(group) >= SHORTEST and entry < CUT_BELOW):
             groups.append(group)
             group = []
     if group:

@@ -17,26 +17,27 @@ def check_scene(scene: Scene) -> None:
         for ident, item in group.items():
             if not ident or ident != item.id:
                 raise ProjectError(f"the {kind} {item.name!r} stands under {ident!r} but is {item.id!r}")
-    for node in scene.nodes.values():
+    parents = {node.parent for node in scene.nodes.values()} - {None}
+    for node in scene.nodes.values() if not parents <= scene.nodes.keys() else ():
         if node.parent is not None and node.parent not in scene.nodes:
             raise ProjectError(f"the parent {node.parent!r} of the node {node.name!r} does not exist")
-        if isinstance(node, MeshObject):
-            for material in node.materials:
-                if material not in scene.materials:
-                    raise ProjectError(f"the material {material!r} of the mesh {node.name!r} does not exist")
-            if len(node.geometry.faces) and highest_slot(node.geometry) >= len(node.materials):
-                raise ProjectError(
-                    f"the mesh {node.name!r} has {len(node.materials)} materials, but a face uses "
-                    f"slot {highest_slot(node.geometry)}"
-                )
-    _check_parents(scene)
+    for node in scene.of(MeshObject):
+        for material in node.materials:
+            if material not in scene.materials:
+                raise ProjectError(f"the material {material!r} of the mesh {node.name!r} does not exist")
+        if len(node.geometry.faces) and highest_slot(node.geometry) >= len(node.materials):
+            raise ProjectError(
+                f"the mesh {node.name!r} has {len(node.materials)} materials, but a face uses "
+                f"slot {highest_slot(node.geometry)}"
+            )
+    _check_parents(scene, parents)
 
 
-def _check_parents(scene: Scene) -> None:
+def _check_parents(scene: Scene, parents: set[str | None]) -> None:
     safe: set[str | None] = {None}
-    for ident in scene.nodes:
+    for start in parents:
         path: dict[str, None] = {}
-        at: str | None = ident
+        at = start
         while at not in safe:
             assert at is not None
             if at in path:
