@@ -25,31 +25,49 @@ I32 = npt.NDArray[np.int32]
 
 SMALLEST, LARGEST = 10, 17
 
-_ONE, _TWO, _FOUR, _HALF = np.float32(1), np.float32(2), np.float32(4), np.float32(0.5)
-_QUARTER_TURN = np.float32(math.pi / 2)
+_ONE, _TWO, _HALF = np.float32(1), np.float32(2), np.float32(0.5)
 _EIGHTH_TURN = np.float32(math.pi / 4)
 _FOUR_OVER_PI = np.float32(4 / math.pi)
 _TINY = np.float32(1e-30)
 
 
 @kernel
+def arctangent(q: np.float32) -> np.float32:
+    """atan(q) for |q| ≤ 1 within 1e-7 (Abramowitz and Stegun 1964, 4.4.49)."""
+    w = q * q
+    series = np.float32(0.0028662257)
+    series = series * w - np.float32(0.0161657367)
+    series = series * w + np.float32(0.0429096138)
+    series = series * w - np.float32(0.0752896400)
+    series = series * w + np.float32(0.1065626393)
+    series = series * w - np.float32(0.1420889944)
+    series = series * w + np.float32(0.1999355085)
+    series = series * w - np.float32(0.3333314528)
+    return q + q * w * series
+
+
+@kernel
+def _cosine_sine(angle: np.float32) -> tuple[np.float32, np.float32]:
+    """cos and sin for |angle| ≤ π/4 by their series, within 1e-7."""
+    w = angle * angle
+    cosine = ((w / np.float32(40320) - _ONE / np.float32(720)) * w + _ONE / np.float32(24)) * w - _HALF
+    sine = ((w / np.float32(-5040) + _ONE / np.float32(120)) * w - _ONE / np.float32(6)) * w
+    return _ONE + cosine * w, angle + angle * sine
+
+
+@kernel
 def direction_at(hemisphere: int, s: np.float32, t: np.float32) -> tuple[np.float32, np.float32, np.float32]:
     """The unit direction of point (s, t) in [0, 1]² of a hemisphere (0: y ≥ 0, 1: y ≤ 0)."""
     a, b = _TWO * s - _ONE, _TWO * t - _ONE
-    if abs(a) > abs(b):
-        r, angle = a, _EIGHTH_TURN * (b / a)
-    elif b != 0:
-        r, angle = b, _QUARTER_TURN - _EIGHTH_TURN * (a / b)
-    else:
-        r, angle = np.float32(0), np.float32(0)
+    first = abs(a) > abs(b)
+    r = a if first else b
+    other = b if first else a
+    cosine, sine = _cosine_sine(_EIGHTH_TURN * (other / (r if r != 0 else _ONE)))
     square = r * r
     lift = np.float32(math.sqrt(_TWO - square)) * r
     y = _ONE - square
-    return (
-        lift * np.float32(math.cos(angle)),
-        y if hemisphere == 0 else -y,
-        lift * np.float32(math.sin(angle)),
-    )
+    x, z = (cosine, sine) if first else (sine, cosine)
+    return lift * x, y if hemisphere == 0 else -y, lift * z
 
 
 @kernel
@@ -59,10 +77,10 @@ def square_of(x: np.float32, y: np.float32, z: np.float32) -> tuple[int, np.floa
     r = np.float32(math.sqrt(around / (_ONE + abs(y))))
     if abs(x) > abs(z):
         a = r if x > 0 else -r
-        b = a * _FOUR_OVER_PI * np.float32(math.atan(z / x))
+        b = a * _FOUR_OVER_PI * arctangent(z / x)
     elif around > _TINY:
         b = r if z > 0 else -r
-        a = b * _FOUR_OVER_PI * np.float32(math.atan(x / z))
+        a = b * _FOUR_OVER_PI * arctangent(x / z)
     else:
         a, b = np.float32(0), np.float32(0)
     return (0 if y >= 0 else 1), _HALF * (a + _ONE), _HALF * (b + _ONE)
