@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import importlib.metadata
+import inspect
 import traceback
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
@@ -39,6 +40,7 @@ class PluginHost:
         self.failures: list[Failure] = []
         self._where: dict[tuple[str, str], tuple[Plugin, str]] = {}
         self._loaded: dict[tuple[str, str], Any] = {}
+        self._broken: dict[tuple[str, str], Failure] = {}
         for plugin in plugins:
             self.add(plugin)
 
@@ -58,17 +60,19 @@ class PluginHost:
             raise PluginError(f"{plugin!r} is not a studio_core.contract.Plugin")
         if plugin.api != API:
             raise PluginError(f"{plugin.id} is made for interface {plugin.api}, this is {API}")
+        if any(plugin.id == other.id for other in self.plugins):
+            raise PluginError(f"there is a plugin {plugin.id} already")
+        offered: dict[tuple[str, str], tuple[Plugin, str]] = {}
         for kind, provided in plugin.provides.items():
             if kind not in KINDS:
                 raise PluginError(f"{plugin.id} provides the unknown kind {kind!r}")
-            for name in provided:
+            for name, where in provided.items():
                 if (kind, name) in self._where:
                     other = self._where[kind, name][0].id
                     raise PluginError(f"{plugin.id} provides {kind} {name!r}, which {other} already does")
+                offered[kind, name] = (plugin, where)
         self.plugins.append(plugin)
-        for kind, provided in plugin.provides.items():
-            for name, where in provided.items():
-                self._where[kind, name] = (plugin, where)
+        self._where |= offered
 
     def names(self, kind: str) -> Sequence[str]:
         """Everything registered of a kind, in order of registration."""
@@ -80,16 +84,19 @@ class PluginHost:
         return self._where[kind, name][0]
 
     def get(self, kind: str, name: str) -> Any:
-        """The provided object, imported on first use and checked against its kind."""
+        """The provided object, imported on first use and checked against its kind.
+
+        What failed once fails again without another try, so that a failure is noted once.
+        """
         if (kind, name) not in self._loaded:
             plugin, where = self._known(kind, name)
             found: list[Any] = []
-            if not self._contained(
+            if (kind, name) not in self._broken and not self._contained(
                 plugin.id, f"{kind} {name!r} failed to load", lambda: found.append(self._load(kind, where))
             ):
-                raise PluginError(
-                    f"plugin {plugin.id}: {kind} {name!r} failed to load: {self.failures[-1].what}"
-                )
+                self._broken[kind, name] = self.failures[-1]
+            if (kind, name) in self._broken:
+                raise PluginError(f"plugin {plugin.id}: {self._broken[kind, name].what}")
             self._loaded[kind, name] = found[0]
         return self._loaded[kind, name]
 
@@ -122,7 +129,7 @@ class PluginHost:
     def _load(self, kind: str, where: str) -> Any:
         module, _, attribute = where.partition(":")
         made = getattr(importlib.import_module(module), attribute)
-        missing = [name for name in _NEEDS.get(kind, ()) if not hasattr(made, name)]
+        missing = [name for name in _NEEDS.get(kind, ()) if not _has(made, name)]
         if missing:
             raise PluginError(f"{where} lacks {', '.join(missing)}")
         return made
@@ -134,6 +141,13 @@ class PluginHost:
             self.report(plugin, what, error)
             return False
         return True
+
+
+def _has(thing: object, name: str) -> bool:
+    """Like `hasattr`, but asks no property: a BRDF's address would be compiled here."""
+    if isinstance(inspect.getattr_static(type(thing), name, None), property):
+        return True
+    return hasattr(thing, name)
 
 
 def _add(host: PluginHost, point: importlib.metadata.EntryPoint) -> None:
