@@ -26,9 +26,8 @@ def result(options: argparse.Namespace, values: dict[str, Any], text: str) -> No
 
 def new(options: argparse.Namespace, program: Headless) -> None:
     """`lucarne new`."""
-    from studio_core.project.store import save
-
     from studio.build_scene import build
+    from studio_core.project.store import save
 
     if options.out.suffix != ".lucarne":
         raise InputError(f"{options.out}: a project's name ends in .lucarne")

@@ -172,7 +172,7 @@ def lamp_terms(
     eye: F32,
     to_lamp: F32,
     weight: F32,
-    occluded: npt.NDArray[np.bool_],
+    seen: npt.NDArray[np.bool_],
     address: I64,
     terms: I64,
     offset: I64,
@@ -183,7 +183,7 @@ def lamp_terms(
     """Adds one lamp at white unit gain: Q samples a point.
 
     to_lamp (P, Q, 3) unit directions, weight (P, Q) irradiance of each on a surface facing it,
-    occluded (P, Q). Q ≤ BATCH.
+    seen (P, Q). Q ≤ BATCH.
     """
     axes = np.empty((3, 3))
     wo = np.empty(3, np.float32)
@@ -203,7 +203,7 @@ def lamp_terms(
         for q in range(samples):
             d = to_lamp[row, q]
             z = axes[2, 0] * d[0] + axes[2, 1] * d[1] + axes[2, 2] * d[2]
-            if z > 0.0 and weight[row, q] > 0.0 and not occluded[row, q]:
+            if z > 0.0 and weight[row, q] > 0.0 and seen[row, q]:
                 keep[count] = q
                 count += 1
                 total += weight[row, q] * z

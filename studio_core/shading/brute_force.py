@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from studio_core.kernels.directions import DirectionSet, direction_set
 from studio_core.kernels.radiance import BATCH, environment_terms, lamp_terms
-from studio_core.kernels.visibility import trace_visibility
+from studio_core.kernels.visibility import occlusion_rays, trace_visibility
 from studio_core.parallel import Workers
 from studio_core.shading.artifacts import (
     TERMS,
@@ -23,7 +23,7 @@ from studio_core.shading.artifacts import (
     Surfaces,
 )
 from studio_core.shading.job import Job
-from studio_core.shading.lamps import lamp_samples
+from studio_core.shading.lamps import lamp_light, lamp_targets
 
 F32 = npt.NDArray[np.float32]
 Points = npt.NDArray[np.int64]
@@ -57,22 +57,23 @@ class VisibilityBits:
         if len(missing):
             self._bits[level][missing] = self._trace(missing, directions, job)
             self._done[level][missing] = True
-        return self._bits[level][points]
+        kept: npt.NDArray[np.uint64] = self._bits[level][points]
+        return kept
 
     def _trace(self, points: Points, directions: DirectionSet, job: Job) -> npt.NDArray[np.uint64]:
         mesh = self._surfaces.mesh
-        bits, counts = trace_visibility(
+        found = trace_visibility(
             self._casters.shadow,
-            mesh.positions[points],
-            mesh.geometric[points],
+            mesh.positions[points] + mesh.origin,
             mesh.normals[points],
-            mesh.inset[points],
             directions,
             self._workers,
             job,
+            geometric_normals=mesh.geometric[points],
+            inset=mesh.inset[points],
         )
-        self.rays += counts.rays
-        return bits
+        self.rays += found.rays
+        return found.words
 
 
 def blank_layer(surfaces: Surfaces) -> LayerRadiance:
@@ -143,25 +144,24 @@ def lamp_layer(
 ) -> LayerRadiance:
     """One lamp's layer at unit gain for `points`, by traced shadow rays to `samples` places of the lamp."""
     layer, mesh = blank_layer(surfaces), surfaces.mesh
-    samples = min(samples, BATCH)
+    targets = lamp_targets(lamp, min(samples, BATCH))
     local_eye = (eye - mesh.origin).astype(np.float32)
-    step = max(1, (1 << 20) // samples)
+    step = max(1, (1 << 20) // len(targets))
     for first in range(0, len(points), step):
         job.checkpoint(first, len(points))
         block = points[first : first + step]
-        positions = mesh.positions[block].astype(np.float64)
-        towards, weight, distance = lamp_samples(lamp, positions, samples, mesh.origin)
-        above = np.einsum("pc,pqc->pq", mesh.normals[block], towards) > 0
-        wanted = above & (weight > 0)
-        occluded = np.ones(weight.shape, np.bool_)
-        rows, columns = np.nonzero(wanted)
-        if len(rows):
-            origins = casters.shadow.origins(
-                positions + mesh.origin, mesh.geometric[block], mesh.inset[block]
-            )
-            occluded[rows, columns] = casters.shadow.occluded(
-                origins[rows], towards[rows, columns], distance[rows, columns] * np.float32(1 - 1e-5), workers
-            )
+        positions = mesh.positions[block] + mesh.origin
+        towards, weight = lamp_light(lamp, targets, positions)
+        seen = occlusion_rays(
+            casters.shadow,
+            positions,
+            mesh.normals[block],
+            targets,
+            workers,
+            job,
+            geometric_normals=mesh.geometric[block],
+            inset=mesh.inset[block],
+        )
         lamp_terms(
             block,
             mesh.positions,
@@ -170,7 +170,7 @@ def lamp_layer(
             local_eye,
             towards,
             weight,
-            occluded,
+            seen,
             shapes.address,
             shapes.terms,
             shapes.offset,

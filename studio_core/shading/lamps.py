@@ -10,6 +10,7 @@ import numpy.typing as npt
 from studio_core.scene.nodes import AreaLamp, DirectionalLamp, Light, PointLamp, Scene, SpotLamp
 from studio_core.shading.artifacts import Lamp
 
+F32 = npt.NDArray[np.float32]
 F64 = npt.NDArray[np.float64]
 
 
@@ -47,13 +48,10 @@ def spot_falloff(cosine: F64, cos_inner: float, cos_cone: float) -> F64:
     return t * t * (3 - 2 * t)
 
 
-def lamp_samples(
-    lamp: Lamp, positions: F64, samples: int, centre: F64
-) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.float32], npt.NDArray[np.float32]]:
-    """Directions (P, Q, 3), irradiance (P, Q) on a surface facing each, distances (P, Q; inf for suns).
+def lamp_targets(lamp: Lamp, samples: int) -> F64:
+    """(Q, 4) where shadow rays go in the world: (x, y, z, 1) on the lamp, (x, y, z, 0) towards a sun.
 
-    Positions are relative to `centre`. Point and spot lamps need one sample; rectangles and discs take
-    `samples`, the same Fibonacci lattice for every point.
+    Point and spot lamps need one; rectangles and discs take `samples` of a Fibonacci lattice.
     """
     if lamp.kind == "directional":
         discs = _disc(1 if lamp.angle <= 0 else samples)
@@ -61,27 +59,33 @@ def lamp_samples(
         spread = math.tan(lamp.angle / 2)
         aim = -lamp.axis + spread * (discs[:, :1] * tangent + discs[:, 1:] * bitangent)
         aim /= np.linalg.norm(aim, axis=1, keepdims=True)
-        shape = (len(positions), len(aim))
-        directions = np.broadcast_to(aim.astype(np.float32), (*shape, 3))
-        weight = np.full(shape, 1.0 / len(aim), np.float32)
-        return np.ascontiguousarray(directions), weight, np.full(shape, np.inf, np.float32)
+        return np.column_stack([aim, np.zeros(len(aim))])
+    places = lamp.position[None]
     if lamp.kind == "area":
         grid = _lattice(samples) - 0.5
         places = lamp.position + grid[:, :1] * lamp.across + grid[:, 1:] * lamp.up
-        power = float(np.linalg.norm(np.cross(lamp.across, lamp.up))) / samples
-    else:
-        places = lamp.position[None]
-        power = 1.0
-    towards = (places - centre)[None] - positions[:, None]
-    distance = np.linalg.norm(towards, axis=2)
-    distance = np.maximum(distance, 1e-6)
+    return np.column_stack([places, np.ones(len(places))])
+
+
+def lamp_light(lamp: Lamp, targets: F64, positions: F64) -> tuple[F32, F32]:
+    """Unit directions (P, Q, 3) from world positions (P, 3) to the targets, and irradiance (P, Q).
+
+    The irradiance is what each target gives to a surface that faces it, at unit gain.
+    """
+    count, samples = len(positions), len(targets)
+    if lamp.kind == "directional":
+        directions = np.broadcast_to(targets[:, :3].astype(np.float32), (count, samples, 3))
+        return np.ascontiguousarray(directions), np.full((count, samples), 1 / samples, np.float32)
+    towards = targets[:, :3] - positions[:, None]
+    distance = np.maximum(np.linalg.norm(towards, axis=2), 1e-6)
     directions = towards / distance[..., None]
-    weight = power / distance**2
+    weight = 1 / distance**2
     if lamp.kind == "area":
-        weight = weight * np.maximum(-directions @ lamp.axis, 0.0)
+        area = float(np.linalg.norm(np.cross(lamp.across, lamp.up)))
+        weight *= area / samples * np.maximum(-directions @ lamp.axis, 0.0)
     elif lamp.kind == "spot":
-        weight = weight * spot_falloff(-directions @ lamp.axis, lamp.cos_inner, lamp.cos_cone)
-    return directions.astype(np.float32), weight.astype(np.float32), distance.astype(np.float32)
+        weight *= spot_falloff(-directions @ lamp.axis, lamp.cos_inner, lamp.cos_cone)
+    return directions.astype(np.float32), weight.astype(np.float32)
 
 
 def _lattice(count: int) -> F64:

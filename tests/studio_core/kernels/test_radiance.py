@@ -109,17 +109,17 @@ def test_lamp_sum_equals_the_oracle(host, samples):
     towards = rng.normal(size=(count, samples, 3))
     towards = (towards / np.linalg.norm(towards, axis=2, keepdims=True)).astype(np.float32)
     weight = rng.random((count, samples)).astype(np.float32)
-    occluded = rng.random((count, samples)) < 0.3
+    seen = rng.random((count, samples)) < 0.7
     eye = np.array([1.0, 2.0, 3.0], np.float32)
     out, irradiance = np.zeros((count, TERMS, 3), np.float32), np.zeros((count, 3), np.float32)
     points = np.arange(count, dtype=np.int64)
-    arguments = (positions, normals, material, eye, towards, weight, occluded)
+    arguments = (positions, normals, material, eye, towards, weight, seen)
     lamp_terms(points, *arguments, address, terms, offsets, data, out, irradiance)
     for p in range(count):
         m = material[p]
         light = np.repeat(weight[p, :, None], 3, axis=1)
         expected, lit = light_sum(
-            brdfs[m], shapes[m], positions[p], normals[p], eye, ~occluded[p], towards[p], light, 1.0
+            brdfs[m], shapes[m], positions[p], normals[p], eye, seen[p], towards[p], light, 1.0
         )
         np.testing.assert_allclose(out[p, : terms[m]], expected, rtol=5e-4, atol=1e-6)
         np.testing.assert_allclose(irradiance[p], lit, rtol=1e-5, atol=1e-6)

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from studio_core.scene.nodes import AreaLamp, DirectionalLamp, Group, PointLamp, Scene, SpotLamp
 from studio_core.scene.transform import Transform, axis_angle, looking
-from studio_core.shading.lamps import lamp_samples, lamps, spot_falloff
+from studio_core.shading.lamps import lamp_light, lamp_targets, lamps, spot_falloff
 
 DOWN = looking((0, 2, 0), (0, 0, 0))
 
@@ -20,7 +20,7 @@ DOWN = looking((0, 2, 0), (0, 0, 0))
 def irradiance(scene, point, normal, samples=256):
     total = 0.0
     for lamp in lamps(scene):
-        directions, weight, _ = lamp_samples(lamp, np.array([point], np.float64), samples, np.zeros(3))
+        directions, weight = lamp_light(lamp, lamp_targets(lamp, samples), np.array([point], np.float64))
         total += float((weight[0] * np.maximum(directions[0] @ np.array(normal, np.float32), 0)).sum())
     return total
 
