@@ -1,0 +1,171 @@
+"""Materials for Mitsuba 3: native BSDFs where they say the same, our own Python BSDFs for the others.
+
+=============  =====================================================================================
+model          Mitsuba
+=============  =====================================================================================
+lambert        `diffuse`
+phong          `lucarne_phong` (bsdfs.py)
+blinn-phong    `lucarne_blinn_phong` (bsdfs.py)
+ggx            `roughconductor` without material where F = 1 (white metal); else `lucarne_ggx`
+any other      `diffuse` of its mean coefficients, with a note
+=============  =====================================================================================
+
+All are wrapped in `twosided`, and in `mask` where opacity is below 1.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+from xml.etree.ElementTree import Element
+
+import numpy as np
+import numpy.typing as npt
+
+from studio_core.contract import Registry
+from studio_core.imaging.encode import write_exr, write_png
+from studio_core.params import Value, param_infos
+from studio_core.scene.geometry import Texture
+from studio_core.scene.nodes import Material, MaterialId, Scene
+from studio_core.shading.materials import Resolved, linear, resolve
+from studio_plugins.export.mitsuba_xml import prop, put, ref, rgb
+
+OWN = {"phong": "lucarne_phong", "blinn-phong": "lucarne_blinn_phong", "ggx": "lucarne_ggx"}
+LEAST_ALPHA = 1e-4
+
+
+@dataclass
+class Materials:
+    """Writes materials into `root` once each, and their textures into `folder`/textures."""
+
+    scene: Scene
+    registry: Registry
+    root: Element
+    folder: Path
+    notes: list[str] = field(default_factory=list)
+    _keys: dict[tuple[MaterialId, MaterialId], str] = field(default_factory=dict)
+    _sides: dict[MaterialId, str] = field(default_factory=dict)
+    _files: dict[tuple[Any, ...], str] = field(default_factory=dict)
+
+    def use(self, parent: Element, front: MaterialId, back: MaterialId) -> None:
+        """Refer to the material seen from the front and from behind."""
+        if (front, back) not in self._keys:
+            sides = [self._side(front), *([self._side(back)] if back != front else [])]
+            material = self.scene.material(front)
+            key = f"material-{len(self._keys)}"
+            if material.opacity < 1:
+                outer = put(self.root, "bsdf", "mask", key=key)
+                prop(outer, "float", "opacity", float(material.opacity))
+                both = put(outer, "bsdf", "twosided")
+                self._note_opacity(material)
+            else:
+                both = put(self.root, "bsdf", "twosided", key=key)
+            for side in sides:
+                ref(both, side)
+            self._keys[front, back] = key
+        ref(parent, self._keys[front, back])
+
+    def _note_opacity(self, material: Material) -> None:
+        shadow = "no shadow" if not material.casts_shadow else "a full shadow"
+        self.notes.append(
+            f"{material.name}: Mitsuba lets {1 - material.opacity:.0%} of the light through its shadow "
+            f"where the studio gives {shadow}, and counts passing through it as a bounce."
+        )
+
+    def _side(self, key: MaterialId) -> str:
+        if key not in self._sides:
+            self._sides[key] = f"side-{len(self._sides)}"
+            self._bsdf(self.scene.material(key), self._sides[key])
+        return self._sides[key]
+
+    def _bsdf(self, material: Material, key: str) -> None:
+        resolved = resolve(material, self.registry)
+        if resolved.problem:
+            self.notes.append(resolved.problem)
+        model, values = resolved.brdf.id, resolved.values
+        if model == "lambert":
+            made = put(self.root, "bsdf", "diffuse", key=key)
+            self._parameter(made, "reflectance", resolved, "base_color")
+        elif model == "ggx" and _is_white_metal(resolved):
+            made = put(self.root, "bsdf", "roughconductor", key=key)
+            prop(made, "string", "material", "none")
+            rgb(made, "specular_reflectance", (1, 1, 1))
+            prop(made, "string", "distribution", "ggx")
+            prop(made, "float", "alpha", _alpha(values))
+            prop(made, "boolean", "sample_visible", True)
+        elif model in OWN:
+            made = put(self.root, "bsdf", OWN[model], key=key)
+            for name in param_infos(resolved.brdf.Params):
+                if model == "ggx" and name == "roughness":
+                    prop(made, "float", "alpha", _alpha(values))
+                else:
+                    self._parameter(made, name, resolved, name)
+        else:
+            self.notes.append(f"{material.name}: Mitsuba has no {resolved.brdf.label}; written as matte.")
+            made = put(self.root, "bsdf", "diffuse", key=key)
+            rgb(made, "reflectance", np.clip(_mean_albedo(resolved), 0, 1))
+
+    def _parameter(self, parent: Element, name: str, resolved: Resolved, source: str) -> None:
+        value, texture = resolved.values[source], resolved.textures.get(source)
+        if texture is not None:
+            self._texture(parent, name, value, texture)
+        elif isinstance(value, tuple):
+            rgb(parent, name, np.clip(value, 0, 1))
+        else:
+            prop(parent, "float", name, float(value))
+
+    def _texture(self, parent: Element, name: str, value: Value, texture: Texture) -> None:
+        """A bitmap of texture · value, in the studio's texture coordinates."""
+        made = put(parent, "texture", "bitmap", name=name)
+        file, raw = self._picture(value, texture)
+        prop(made, "string", "filename", file)
+        prop(made, "boolean", "raw", raw)
+        prop(made, "string", "filter_type", "bilinear")
+        prop(made, "string", "wrap_mode", "repeat")
+        # Mitsuba's v runs down the picture and the studio's runs up: v ↦ 1 − (scale · v + offset).
+        scale, offset = texture.scale, texture.offset
+        held = put(made, "transform", name="to_uv")
+        put(held, "scale").attrib.update(x=repr(scale[0]), y=repr(-scale[1]))
+        put(held, "translate").attrib.update(x=repr(offset[0]), y=repr(1 - offset[1]))
+
+    def _picture(self, value: Value, texture: Texture) -> tuple[str, bool]:
+        image, colour = texture.image, isinstance(value, tuple)
+        known = (image.key, value, colour)
+        as_it_is = value == (1.0, 1.0, 1.0) and image.pixels.dtype == np.uint8 and image.encoding == "srgb"
+        suffix = "png" if as_it_is else "exr"
+        if known not in self._files:
+            (self.folder / "textures").mkdir(exist_ok=True)
+            self._files[known] = f"textures/{len(self._files)}.{suffix}"
+            target = self.folder / self._files[known]
+            if as_it_is:
+                write_png(target, _three(image.pixels))
+            elif colour:
+                write_exr(target, np.clip(_three(linear(image)) * np.asarray(value, np.float32), 0, 1))
+            else:
+                scalar = linear(image)[..., :1] * np.asarray(value, np.float32)
+                write_exr(target, np.clip(scalar, 0, 1))
+        return self._files[known], not as_it_is
+
+
+def _three(pixels: npt.NDArray[Any]) -> npt.NDArray[Any]:
+    return np.repeat(pixels, 3, axis=2) if pixels.shape[2] == 1 else pixels[..., :3]
+
+
+def _alpha(values: Mapping[str, Value]) -> float:
+    roughness = float(values["roughness"])  # type: ignore[arg-type]
+    return max(roughness * roughness, LEAST_ALPHA)
+
+
+def _is_white_metal(resolved: Resolved) -> bool:
+    white = resolved.values["metallic"] == 1.0 and resolved.values["base_color"] == (1.0, 1.0, 1.0)
+    return white and not {"metallic", "base_color"} & set(resolved.textures)
+
+
+def _mean_albedo(resolved: Resolved) -> npt.NDArray[np.floating[Any]]:
+    """Head-on diffuse estimate of a model that Mitsuba does not know: π times its first coefficient."""
+    numbers = {k: v for k, v in resolved.values.items() if not isinstance(v, str | bool)}
+    values = {k: np.asarray(v, np.float32) for k, v in numbers.items()}
+    first: npt.NDArray[np.floating[Any]] = resolved.brdf.coefficients(values)[0] * np.pi
+    return first
