@@ -129,7 +129,8 @@ class Pipeline:
             if ran:
                 artifacts = {need: made[need][0] for need in stage.needs}
                 inputs = Inputs(artifacts, record.pending, record.artifact, rebuilt)
-                with job.publishing(partial(self._flow, frame, index, dict(made), job)):
+                so_far = {kind: artifact for kind, (artifact, _) in made.items()}
+                with job.publishing(partial(self._flow, frame, index, so_far, job)):
                     result = stage.run(frame, inputs, job)
                 if result is not record.artifact or record.stamp == 0:
                     record.artifact = result
@@ -141,14 +142,12 @@ class Pipeline:
             self.report.append(StageRun(type(stage).__name__, ran, record.stamp != before, seconds))
         return self._records[-1].artifact
 
-    def _flow(
-        self, frame: Frame, index: int, made: dict[type, tuple[Any, int]], job: Job, artifact: Any
-    ) -> Any:
+    def _flow(self, frame: Frame, index: int, made: Mapping[type, Any], job: Job, artifact: Any) -> Any:
         """What the stages after `index` make of a partial artifact; nothing of it is kept."""
-        artifacts = {kind: found for kind, (found, _) in made.items()}
-        artifacts[self.stages[index].gives] = artifact
-        for stage in self.stages[index + 1 :]:
+        artifacts = {**made, self.stages[index].gives: artifact}
+        for after, stage in enumerate(self.stages[index + 1 :], index + 1):
             needed = {need: artifacts[need] for need in stage.needs}
             inputs = Inputs(needed, everything(frame.scene), None, frozenset(stage.needs))
-            artifacts[stage.gives] = stage.run(frame, inputs, job)
+            with job.publishing(partial(self._flow, frame, after, dict(artifacts), job)):
+                artifacts[stage.gives] = stage.run(frame, inputs, job)
         return artifacts[self.stages[-1].gives]
