@@ -80,10 +80,10 @@ class CasterHandles:
 class RayCaster:
     """Placed meshes that rays are traced against.
 
-    `previous` lends the tracer and the meshes of an earlier caster, so that after an edit only new
-    meshes are built. `backend` and `reason` tell which tracer is in use and why, `rays` how many rays
-    were traced. Don't move objects while another thread traces. `close()` it, or use it as a context
-    manager.
+    `previous` lends the tracer and the meshes of an earlier caster that is still open, so that after an
+    edit only new meshes are built. `backend` and `reason` tell which tracer is in use and why, `rays`
+    how many rays were traced. Don't move objects or close it while another thread traces. `close()` it,
+    or use it as a context manager.
     """
 
     def __init__(
@@ -111,7 +111,7 @@ class RayCaster:
         self._keys = [item.key for item in objects]
         lows, highs = self._bounds()
         self.centre: F64 = (lows + highs) / 2
-        self._scene: Scene = self._device.scene(
+        self._open: Scene | None = self._device.scene(
             [shared.mesh for shared in self._objects], [self._placed(i) for i in range(len(objects))]
         )
         self._collect_faces()
@@ -128,13 +128,21 @@ class RayCaster:
 
     def close(self) -> None:
         """Frees the scene at once, and its meshes unless another caster uses them."""
-        self._scene.close()
-        self._objects, self._meshes = [], {}
+        if self._open is not None:
+            self._open.close()
+        self._open, self._objects, self._meshes = None, [], {}
+
+    @property
+    def _scene(self) -> Scene:
+        if self._open is None:  # its address leads nowhere
+            raise RuntimeError("this ray caster is closed")
+        return self._open
 
     def move(self, index: int, transform: F64) -> None:
         """Places an object anew; `centre` stays, `epsilon` may grow."""
+        scene = self._scene
         self._transforms[index] = affine(transform, self._keys[index])
-        self._scene.move(index, self._placed(index))
+        scene.move(index, self._placed(index))
         self._refresh()
 
     def local(self, points: npt.ArrayLike) -> F32:

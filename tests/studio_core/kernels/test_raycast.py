@@ -393,6 +393,14 @@ def test_meshes_are_shared_and_lent(backend: str, workers: Workers, monkeypatch:
         assert not built
         first.close()
         first.close()
+        for use in (
+            first.handles,
+            lambda: first.occluded(np.zeros((1, 3)), np.ones((1, 3)), 1.0, workers),
+            lambda: first.closest(np.zeros((1, 3)), np.ones((1, 3)), 0.0, 1.0, workers),
+            lambda: first.move(0, np.eye(4)),
+        ):
+            with pytest.raises(RuntimeError, match="closed"):
+                use()
         origins, directions = random_rays(rng, 300)
         expected = nearest(plain(objects[:3]), origins, directions)
         clear = expected.margin > 1e-4
