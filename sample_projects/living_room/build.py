@@ -51,7 +51,9 @@ def furnish(stage: Stage) -> None:
     stage.put([tables.bowl(), tables.fruit()], dining, placed(0.05, 0.02, 0.0, 0.735))
     chair = seating.chair()
     geometry = chair.geometry()
-    stage.shape("Chair at the front", geometry, chair.materials, dining, placed(0.62, 0.28, -112.0), "dining-")
+    stage.shape(
+        "Chair at the front", geometry, chair.materials, dining, placed(0.62, 0.28, -112.0), "dining-"
+    )
     stage.shape("Chair at the back", geometry, chair.materials, dining, placed(0.02, -0.68, 8.0), "dining-")
     lamp = stage.group("Floor lamp", placed(0.42, -2.12, 20.0))
     stage.put(decor.floor_lamp(), lamp)
@@ -67,6 +69,4 @@ def furnish(stage: Stage) -> None:
         )
     )
     stage.put(decor.plant(), stage.group("Rubber fig", placed(-2.55, -1.95, 40.0)))
-    stage.put(
-        decor.picture(1.05, 0.84), stage.group("Picture", Transform((-0.85, 1.2, LOW[2] + 0.005)))
-    )
+    stage.put(decor.picture(1.05, 0.84), stage.group("Picture", Transform((-0.85, 1.2, LOW[2] + 0.005))))

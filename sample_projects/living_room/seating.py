@@ -62,7 +62,9 @@ def sofa() -> list[Part]:
         rest = rest.turned((0, 0, 1), shift * 110).turned((1, 0, 0), -13 - shift * 150)
         parts.append(Part(f"Back cushion {name}", rest.moved(x, 0.655, -0.215), ("fabric",)))
     legs = [
-        leg((0.86 * s, 0.17, z), (0.93 * s, 0.0, z * 1.12), 0.05, 0.028) for s in (-1, 1) for z in (-0.32, 0.34)
+        leg((0.86 * s, 0.17, z), (0.93 * s, 0.0, z * 1.12), 0.05, 0.028)
+        for s in (-1, 1)
+        for z in (-0.32, 0.34)
     ]
     parts.append(Part("Legs", joined(*legs), ("oak",)))
     throw = pillow(0.47, 0.47, 0.19).turned((0, 0, 1), 5).turned((1, 0, 0), -24).turned((0, 1, 0), 24)
@@ -78,16 +80,22 @@ def armchair() -> list[Part]:
     round_bar, paddle = circle(8, 1.0, 1.0), circle(10, 0.062, 0.026)
     for side in (-1.0, 1.0):
         x = 0.335 * side
-        bars.append(leg((x, 0.56, 0.27), (x * 1.03, 0.0, 0.33), 0.036, 0.026, around=8, rings=8))
-        bars.append(leg((x, 0.52, -0.28), (x * 1.03, 0.0, -0.4), 0.036, 0.026, around=8, rings=8))
-        line = spline([(x, 0.575, 0.36), (x * 1.01, 0.572, 0.2), (x, 0.55, -0.1), (x * 0.98, 0.522, -0.34)], 12)
-        bars.append(sweep(line, paddle, np.interp(np.linspace(0, 1, 12), [0, 0.2, 0.6, 1], [1.0, 1.15, 0.9, 0.8])))
+        bars.append(leg((x, 0.56, 0.27), (x * 1.03, 0.0, 0.33), 0.036, 0.026, rings=6))
+        bars.append(leg((x, 0.52, -0.28), (x * 1.03, 0.0, -0.4), 0.036, 0.026, rings=6))
+        line = spline(
+            [(x, 0.575, 0.36), (x * 1.01, 0.572, 0.2), (x, 0.55, -0.1), (x * 0.98, 0.522, -0.34)], 9
+        )
+        bars.append(
+            sweep(line, paddle, np.interp(np.linspace(0, 1, 9), [0, 0.2, 0.6, 1], [1.0, 1.15, 0.9, 0.8]))
+        )
         post = spline([(x * 0.84, 0.25, -0.2), (x * 0.84, 0.5, -0.3), (x * 0.84, 0.86, -0.47)], 9)
         bars.append(sweep(post, round_bar, np.linspace(0.034, 0.024, 9)))
-        rail = np.linspace([x, 0.3, 0.295], [x, 0.24, -0.34], 8)
+        rail = np.linspace([x, 0.3, 0.295], [x, 0.24, -0.34], 5)
         bars.append(sweep(rail, circle(8, 0.024, 0.046), round_ends=False))
     for y, z in ((0.275, 0.285), (0.235, -0.3)):
-        bars.append(sweep(np.linspace([-0.335, y, z], [0.335, y, z], 9), circle(8, 0.024, 0.044), up=(0, 1, 0)))
+        bars.append(
+            sweep(np.linspace([-0.335, y, z], [0.335, y, z], 6), circle(8, 0.024, 0.044), round_ends=False)
+        )
     for y in (0.5, 0.64, 0.78):
         z = -0.3 - (y - 0.5) * 0.46
         slat = spline([(-0.285, y, z), (0, y, z - 0.025), (0.285, y, z)], 9)
@@ -114,14 +122,21 @@ def chair() -> Part:
     frame = rounded_box((0.4, 0.045, 0.38), (0.09, 0.015, 0.09), (2, 1, 2), 2).moved(y=0.418)
     wood = [frame]
     for side in (-1.0, 1.0):
-        wood.append(leg((0.165 * side, 0.41, 0.15), (0.215 * side, 0.0, 0.205), 0.036, 0.022, around=8))
-        wood.append(leg((0.15 * side, 0.41, -0.15), (0.2 * side, 0.0, -0.23), 0.036, 0.022, around=8))
+        wood.append(leg((0.165 * side, 0.41, 0.15), (0.215 * side, 0.0, 0.205), 0.036, 0.022))
+        wood.append(leg((0.15 * side, 0.41, -0.15), (0.2 * side, 0.0, -0.23), 0.036, 0.022))
     bow = spline(
-        [(-0.225, 0.735, -0.13), (-0.2, 0.76, -0.235), (0.0, 0.785, -0.305), (0.2, 0.76, -0.235), (0.225, 0.735, -0.13)], 19
+        [
+            (-0.225, 0.735, -0.13),
+            (-0.2, 0.76, -0.235),
+            (0.0, 0.785, -0.305),
+            (0.2, 0.76, -0.235),
+            (0.225, 0.735, -0.13),
+        ],
+        15,
     )
-    swell = np.interp(np.linspace(0, 1, 19), [0, 0.2, 0.5, 0.8, 1], [0.55, 0.8, 1.15, 0.8, 0.55])
-    wood.append(sweep(bow, circle(10, 0.026, 0.068), swell))
+    swell = np.interp(np.linspace(0, 1, 15), [0, 0.2, 0.5, 0.8, 1], [0.55, 0.8, 1.15, 0.8, 0.55])
+    wood.append(sweep(bow, circle(8, 0.026, 0.068), swell))
     for x in (-0.17, -0.085, 0.0, 0.085, 0.17):
         top = (x * 1.12, 0.772 - 0.35 * x * x, -0.295 + 1.7 * x * x)
-        wood.append(leg(top, (x * 0.86, 0.42, -0.165 + 0.5 * x * x), 0.013, 0.018, around=8, rings=5))
+        wood.append(leg(top, (x * 0.86, 0.42, -0.165 + 0.5 * x * x), 0.013, 0.018, around=6, rings=4))
     return Part("Chair", joined(joined(*wood).slot(0), pad.slot(1)), ("dark oak", "wool"))

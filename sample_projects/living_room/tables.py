@@ -21,10 +21,21 @@ def coffee_table() -> list[Part]:
         for t in (-1, 1)
     ]
     for z in (-0.155, 0.155):
-        bars.append(sweep(np.linspace([-0.48, 0.17, z * 1.5], [0.48, 0.17, z * 1.5], 8), circle(8, 0.02, 0.02)))
+        bars.append(
+            sweep(np.linspace([-0.48, 0.17, z * 1.5], [0.48, 0.17, z * 1.5], 7), circle(8, 0.02, 0.02))
+        )
     for x in np.linspace(-0.36, 0.36, 8):
-        bars.append(sweep(np.linspace([x, 0.183, -0.245], [x, 0.183, 0.245], 5), circle(6, 0.036, 0.012)))
-    return [Part("Top", top, ("grained walnut",), textured=True), Part("Legs and shelf", joined(*bars), ("walnut",))]
+        bars.append(
+            sweep(
+                np.linspace([x, 0.183, -0.245], [x, 0.183, 0.245], 5),
+                circle(6, 0.036, 0.012),
+                round_ends=False,
+            )
+        )
+    return [
+        Part("Top", top, ("grained walnut",), textured=True),
+        Part("Legs and shelf", joined(*bars), ("walnut",)),
+    ]
 
 
 def round_table() -> list[Part]:
@@ -39,30 +50,69 @@ def round_table() -> list[Part]:
     over = np.stack([np.linspace(rim[-1][0], 0.0, 10), np.full(10, high)], 1)
     top = lathe([np.concatenate([under[:-1], rim, over[1:]])], 36)
     foot = spline(
-        [(0.27, 0.006), (0.255, 0.016), (0.16, 0.035), (0.06, 0.09), (0.034, 0.3), (0.036, 0.5), (0.075, 0.68), (0.13, high - thick)],
+        [
+            (0.27, 0.006),
+            (0.255, 0.016),
+            (0.16, 0.035),
+            (0.06, 0.09),
+            (0.034, 0.3),
+            (0.036, 0.5),
+            (0.075, 0.68),
+            (0.13, high - thick),
+        ],
+        17,
+    )
+    base = lathe(
+        [
+            [(0.0, 0.0), (0.265, 0.0)],
+            np.concatenate([[(0.265, 0.0)], foot]),
+            [(0.13, high - thick), (0, high - thick)],
+        ],
         22,
     )
-    base = lathe([[(0.0, 0.0), (0.265, 0.0)], np.concatenate([[(0.265, 0.0)], foot]), [(0.13, high - thick), (0, high - thick)]], 24)
     return [Part("Top", top, ("lacquer",)), Part("Pedestal", base, ("lacquer",))]
 
 
 def vase() -> list[Part]:
     """A glazed vase, 0.27 m high, with three stems of eucalyptus."""
-    outer = spline([(0.045, 0.004), (0.06, 0.02), (0.088, 0.09), (0.07, 0.165), (0.034, 0.215), (0.032, 0.245), (0.046, 0.268)], 20)
-    lip = [(0.046 - 0.004 * (1 - math.cos(a)), 0.268 + 0.004 * math.sin(a)) for a in np.linspace(0, math.pi, 5)]
-    inner = spline([(0.038, 0.268), (0.026, 0.242), (0.028, 0.215), (0.06, 0.16), (0.07, 0.09), (0.0, 0.02)], 10)
-    body = lathe([[(0.0, 0.0), (0.041, 0.0)], np.concatenate([[(0.041, 0.0)], outer[:-1], lip, inner[1:]])], 22)
+    outer = spline(
+        [
+            (0.045, 0.004),
+            (0.06, 0.02),
+            (0.088, 0.09),
+            (0.07, 0.165),
+            (0.034, 0.215),
+            (0.032, 0.245),
+            (0.046, 0.268),
+        ],
+        16,
+    )
+    lip = [
+        (0.046 - 0.004 * (1 - math.cos(a)), 0.268 + 0.004 * math.sin(a)) for a in np.linspace(0, math.pi, 5)
+    ]
+    inner = spline(
+        [(0.038, 0.268), (0.026, 0.242), (0.028, 0.215), (0.06, 0.16), (0.07, 0.09), (0.0, 0.02)], 8
+    )
+    body = lathe(
+        [[(0.0, 0.0), (0.041, 0.0)], np.concatenate([[(0.041, 0.0)], outer[:-1], lip, inner[1:]])], 22
+    )
     rng = np.random.default_rng(11)
     stems, leaves = [], []
     for lean, turn, length in ((0.2, 20.0, 0.34), (0.32, 150.0, 0.27), (0.26, 265.0, 0.3)):
-        t = np.linspace(0, 1, 9)
-        line = np.stack([0.02 + lean * length * t**1.6 * 1.3, 0.12 + (0.13 + length) * t, 0.03 * np.sin(3 * t)], 1)
-        stems.append(sweep(line, circle(6, 0.006, 0.006), np.linspace(1.0, 0.5, 9)).turned((0, 1, 0), turn))
+        t = np.linspace(0, 1, 7)
+        line = np.stack(
+            [0.02 + lean * length * t**1.6 * 1.3, 0.12 + (0.13 + length) * t, 0.03 * np.sin(3 * t)], 1
+        )
+        stems.append(sweep(line, circle(5, 0.006, 0.006), np.linspace(1.0, 0.5, 7)).turned((0, 1, 0), turn))
         for k in range(12):
             at = 0.36 + 0.64 * k / 11
             place = [float(np.interp(at, t, line[:, c])) for c in range(3)]
-            blade = leaf(rng.uniform(0.07, 0.09) * (1.2 - 0.5 * at), 0.052 * (1.25 - 0.5 * at), 0.5, 0.25, 4, 2)
-            blade = blade.turned((0, 0, 1), rng.uniform(15, 50)).turned((0, 1, 0), k * 137.5 + rng.uniform(-15, 15))
+            blade = leaf(
+                rng.uniform(0.07, 0.09) * (1.2 - 0.5 * at), 0.052 * (1.25 - 0.5 * at), 0.5, 0.25, 3, 2
+            )
+            blade = blade.turned((0, 0, 1), rng.uniform(15, 50)).turned(
+                (0, 1, 0), k * 137.5 + rng.uniform(-15, 15)
+            )
             leaves.append(blade.moved(*place).turned((0, 1, 0), turn))
     return [
         Part("Vase", body, ("glaze",)),
@@ -73,19 +123,32 @@ def vase() -> list[Part]:
 
 def bowl() -> Part:
     """A shallow stoneware bowl, 0.28 m across."""
-    outside = spline([(0.05, 0.0), (0.06, 0.006), (0.1, 0.03), (0.135, 0.075)], 10)
-    inside = spline([(0.132, 0.077), (0.095, 0.036), (0.05, 0.014), (0.0, 0.01)], 8)
-    body = lathe([[(0.0, 0.0), (0.05, 0.0)], np.concatenate([outside, inside])], 24)
+    outside = spline([(0.05, 0.0), (0.06, 0.006), (0.1, 0.03), (0.135, 0.075)], 7)
+    inside = spline([(0.132, 0.077), (0.095, 0.036), (0.05, 0.014), (0.0, 0.01)], 7)
+    body = lathe([[(0.0, 0.0), (0.05, 0.0)], np.concatenate([outside, inside])], 22)
     return Part("Bowl", body, ("stoneware",))
 
 
 def fruit() -> Part:
     """Three lemons for the bowl."""
-    line = [(0.0, -0.04), (0.008, -0.0385), (0.02, -0.029), (0.03, -0.01), (0.03, 0.01), (0.02, 0.029), (0.008, 0.0385), (0.0, 0.042)]
-    one = lathe([spline(line, 10)], 12)
+    line = [
+        (0.0, -0.04),
+        (0.008, -0.0385),
+        (0.02, -0.029),
+        (0.03, -0.01),
+        (0.03, 0.01),
+        (0.02, 0.029),
+        (0.008, 0.0385),
+        (0.0, 0.042),
+    ]
+    one = lathe([spline(line, 9)], 10)
     made = [
         one.turned((0, 0, 1), 80).turned((0, 1, 0), turn).moved(x, y, z)
-        for turn, x, y, z in ((20.0, -0.035, 0.06, 0.02), (140.0, 0.04, 0.061, 0.015), (265.0, 0.0, 0.062, -0.045))
+        for turn, x, y, z in (
+            (20.0, -0.035, 0.06, 0.02),
+            (140.0, 0.04, 0.061, 0.015),
+            (265.0, 0.0, 0.062, -0.045),
+        )
     ]
     return Part("Lemons", joined(*made), ("lemon",))
 
@@ -93,11 +156,15 @@ def fruit() -> Part:
 def books() -> list[Part]:
     """Three books in a pile, 0.1 m high."""
     made, height = [], 0.0
-    sizes = (("blue", 0.3, 0.032, 0.225, 6.0), ("cream", 0.27, 0.026, 0.2, -9.0), ("rust", 0.23, 0.022, 0.165, 14.0))
+    sizes = (
+        ("blue", 0.3, 0.032, 0.225, 6.0),
+        ("cream", 0.27, 0.026, 0.2, -9.0),
+        ("rust", 0.23, 0.022, 0.165, 14.0),
+    )
     for colour, width, thick, depth, turn in sizes:
-        board = rounded_box((width, 0.003, depth), 0.0014, (2, 1, 2), 1)
-        spine = rounded_box((0.004, thick, depth), 0.0018, (1, 1, 1), 1).moved(x=0.002 - width / 2, y=thick / 2)
-        pages = rounded_box((width - 0.012, thick - 0.006, depth - 0.012), 0.0012, (2, 1, 2), 1)
+        board = rounded_box((width, 0.003, depth), 0.0014, 1, 1)
+        spine = rounded_box((0.004, thick, depth), 0.0018, 1, 1).moved(x=0.002 - width / 2, y=thick / 2)
+        pages = rounded_box((width - 0.012, thick - 0.006, depth - 0.012), 0.0012, 1, 1)
         cover = joined(board.moved(y=0.0015), board.moved(y=thick - 0.0015), spine).slot(0)
         book = joined(cover, pages.moved(x=-0.002, y=thick / 2).slot(1)).turned((0, 1, 0), turn)
         made.append(Part(f"Book {colour}", book.moved(y=height), (f"{colour} cloth", "paper")))

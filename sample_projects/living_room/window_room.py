@@ -15,9 +15,10 @@ import numpy as np
 from studio_core.colour import LUMINANCE
 
 from ..modelling import equirect
-from ..modelling.mesh import Array, Point
+from ..modelling.landscape import Landscape
+from ..modelling.mesh import Array, Mask, Point, unit
 from ..modelling.radiosity import Wall, bounced, walls
-from ..modelling.sky import SUN_RADIUS, Sky, sun_at
+from ..modelling.sky import Sky, sun_at
 
 LOW: Point = (-3.0, 0.0, -2.5)
 HIGH: Point = (3.0, 2.8, 2.5)
@@ -28,7 +29,7 @@ GLASS = 0.88
 GLASS_SHARE = 0.82  # of an opening; the rest is frame and bars
 FRAME, BAR = 0.07, 0.035
 SKY = Sky(turbidity=4.5, sun=sun_at(46.0, 118.0))
-SKY_LIGHT = 33.0  # klx on level ground, without the sun
+outside = Landscape(SKY, ground=(0.20, 0.19, 0.15), trees=0.12, shaded=True).painter()
 UPWARD_IRRADIANCE = 2.5  # what a table top gets, in units of radiance · sr: mid-greys land near 0.25
 PAINT = {
     "wall": (0.72, 0.68, 0.61),
@@ -55,27 +56,7 @@ WINDOWS = (
 )
 
 
-def outside(directions: Array) -> Array:
-    """(N, 3) radiance of sky, trees and garden in kcd/m² by direction.
-
-    The house's own shadow lies on the ground near it, so what is seen downwards gets light of the sky alone.
-    """
-    made = SKY.radiance(directions)
-    up = np.arcsin(np.clip(directions[:, 1], -1, 1))
-    turn = np.arctan2(directions[:, 0], directions[:, 2])
-    bumps = ((0.03, 3, 0.4), (0.018, 11, 2.0), (0.01, 29, 1.1), (0.006, 67, 0.0))
-    crowns = 0.085 + sum(a * np.sin(f * turn + p) for a, f, p in bumps)
-    leaves = 1 + 0.35 * np.sin(41 * turn + 3 * np.sin(60 * up)) * np.sin(90 * up + 2 * np.sin(37 * turn))
-    sunlight = SKY.sun_radiance() * 2 * math.pi * (1 - math.cos(SUN_RADIUS))
-    tree = np.array([0.065, 0.085, 0.04]) / math.pi * (0.5 * SKY_LIGHT + 0.55 * sunlight)
-    lit = 1 / (1 + np.exp(-(up + 0.2) * 40))[:, None]
-    ground = np.array([0.20, 0.19, 0.15]) / math.pi * (0.7 * SKY_LIGHT + SKY.sun[1] * lit * sunlight)
-    haze = SKY.radiance(np.stack([np.sin(turn), np.full_like(turn, 0.02), np.cos(turn)], 1))
-    made = np.where((up < crowns)[:, None], 0.75 * tree * leaves[:, None] + 0.18 * haze, made)
-    return np.where((up < -0.015)[:, None], ground, made)
-
-
-def glazing(window: Window, flat: Array) -> Array:
+def glazing(window: Window, flat: Array) -> Mask:
     """(N,) True where coordinates on the opening's outer plane are glass, not frame or bar."""
     low, high = np.array(window.low), np.array(window.high)
     inside = ((flat > low + FRAME) & (flat < high - FRAME)).all(axis=1)
@@ -88,12 +69,12 @@ def glazing(window: Window, flat: Array) -> Array:
     return np.asarray(inside & ~bars)
 
 
-def through(side: Wall, window: Window, flat: Array, directions: Array) -> tuple[Array, Array, Array]:
-    """Follows rays that enter an opening: (outer coordinates (N, 2), reaches outer plane, is glass)."""
+def through(side: Wall, window: Window, flat: Array, directions: Array) -> tuple[Mask, Mask]:
+    """Whether rays that enter an opening at `flat` reach its outer plane, and whether there is glass."""
     depth = REVEAL / np.maximum(-side.inward * directions[:, side.axis], 1e-6)
     outer = flat + depth[:, None] * directions[:, list(side.spans)]
-    reaches = ((outer > window.low) & (outer < window.high)).all(axis=1)
-    return outer, reaches, reaches & glazing(window, outer)
+    reaches = np.asarray(((outer > window.low) & (outer < window.high)).all(axis=1))
+    return reaches, reaches & glazing(window, outer)
 
 
 def from_windows(points: Array, normal: Array, sides: list[Wall]) -> Array:
@@ -110,7 +91,7 @@ def from_windows(points: Array, normal: Array, sides: list[Wall]) -> Array:
             ray /= np.sqrt(square)[..., None]
             weight = np.maximum(ray @ normal, 0) * np.maximum(ray @ -side.normal, 0) / square * area
             flat_rays = ray.reshape(-1, 3)
-            _, reaches, _ = through(side, window, np.tile(centres, (len(ray), 1)), flat_rays)
+            reaches, _ = through(side, window, np.tile(centres, (len(ray), 1)), flat_rays)
             lit = (weight.ravel() > 0) & reaches
             light = np.zeros((len(flat_rays), 3))
             light[lit] = outside(flat_rays[lit]) * GLASS * GLASS_SHARE
@@ -179,7 +160,7 @@ class Room:
     def _window(self, window: Window, flat: Array, rays: Array) -> Array:
         """Glass shows the garden, frames the light of the room, reveals both."""
         side = self.sides[window.wall]
-        _, reaches, clear = through(side, window, flat, rays)
+        reaches, clear = through(side, window, flat, rays)
         low, high = np.array(window.low), np.array(window.high)
         room = side.smooth(self.irradiance[window.wall], flat)
         made = np.array(PAINT["white"]) * room / math.pi
@@ -191,8 +172,8 @@ class Room:
             wall = np.where(slope > 0, high, low)
             depth = ((wall - flat[deep]) / np.where(np.abs(slope) < 1e-9, 1e-9, slope)).min(axis=1)
             depth = np.clip(depth, 0, REVEAL)
-            outward = -side.normal
-            view = outside(np.stack([outward, outward + [0, 0.5, 0], outward - [0, 0.5, 0]])).mean(axis=0)
+            outwards = unit(np.array([[0.0, 0.0, 0.0], [0.0, 0.5, 0.0], [0.0, -0.5, 0.0]]) - side.normal)
+            view = outside(outwards).mean(axis=0)
             share = 0.5 * (1 - (REVEAL - depth) / np.hypot(REVEAL - depth, 0.9))
             made[deep] = np.array(PAINT["white"]) * (
                 room[deep] / math.pi * 0.6 + share[:, None] * view * GLASS

@@ -14,6 +14,7 @@ from studio_core.scene.transform import axis_angle, rotation_matrix
 
 Array = npt.NDArray[np.float64]
 Indices = npt.NDArray[np.int64]
+Mask = npt.NDArray[np.bool_]
 Point = tuple[float, float, float]
 
 
@@ -84,7 +85,7 @@ class Mesh:
 
 def unit(vectors: Array) -> Array:
     """Vectors (N, 3) divided by their lengths."""
-    return vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
+    return np.asarray(vectors / np.linalg.norm(vectors, axis=1, keepdims=True))
 
 
 def face_normals(positions: Array, faces: Indices) -> Array:
@@ -158,8 +159,9 @@ def spline(points: npt.ArrayLike, count: int) -> Array:
     padded = np.concatenate([[2 * knots[0] - knots[1]], knots, [2 * knots[-1] - knots[-2]]])
     dense = []
     for p0, p1, p2, p3 in zip(padded, padded[1:], padded[2:], padded[3:], strict=False):
-        t0, t1, t2, t3 = np.cumsum([0.0, *(math.sqrt(float(np.linalg.norm(b - a))) for a, b in
-                                           ((p0, p1), (p1, p2), (p2, p3)))])
+        t0, t1, t2, t3 = np.cumsum(
+            [0.0, *(math.sqrt(float(np.linalg.norm(b - a))) for a, b in ((p0, p1), (p1, p2), (p2, p3)))]
+        )
         t = np.linspace(t1, t2, 33)[:-1, None]
         a1 = (t1 - t) / (t1 - t0) * p0 + (t - t0) / (t1 - t0) * p1
         a2 = (t2 - t) / (t2 - t1) * p1 + (t - t1) / (t2 - t1) * p2

@@ -105,5 +105,3 @@ class Stage:
         used = {m for node in nodes if isinstance(node, MeshObject) for m in node.materials}
         kept = [m for m in self.materials.values() if m.id in used]
         return Scene().with_materials(*kept).with_nodes(*nodes)
-
-

@@ -51,6 +51,24 @@ def rounded_box(
     return facing(core + radii * outward, outward / radii, np.concatenate(faces))
 
 
+def box(size: Point) -> Mesh:
+    """A box with sharp edges, centred at the origin."""
+    points: list[Array] = []
+    normals: list[Array] = []
+    faces: list[Indices] = []
+    for axis in range(3):
+        u, v = (k for k in range(3) if k != axis)
+        for side in (-1.0, 1.0):
+            quad = np.zeros((4, 3))
+            quad[:, axis] = side
+            quad[:, u], quad[:, v] = (-1, 1, 1, -1), (-1, -1, 1, 1)
+            first = 4 * len(points)
+            points.append(quad * np.array(size) / 2)
+            normals.append(np.tile(np.eye(3)[axis] * side, (4, 1)))
+            faces.append(np.array([[0, 1, 2], [0, 2, 3]]) + first)
+    return facing(np.concatenate(points), np.concatenate(normals), np.concatenate(faces))
+
+
 def lathe(profile: Sequence[npt.ArrayLike], segments: int = 24) -> Mesh:
     """The solid of revolution about y of a profile (radius, height), listed bottom to top outside.
 
@@ -75,12 +93,12 @@ def lathe(profile: Sequence[npt.ArrayLike], segments: int = 24) -> Mesh:
         index = np.arange(line.shape[0] * segments).reshape(-1, segments)
         index[on_axis] = index[on_axis, :1]  # one vertex a pole
         used, compact = np.unique(index, return_inverse=True)
-        compact = compact.reshape(index.shape)
+        rows, columns = index.shape
         points.append(grid_points[used])
         normals.append(grid_normals[used])
         v = np.linspace(0, 1, len(line))
         uvs.append(np.stack([used % segments / segments, v[used // segments]], 1))
-        faces.append(compact.ravel()[grid_faces(*compact.shape, wrap=True)] + first)
+        faces.append(compact.ravel()[grid_faces(rows, columns, wrap=True)] + first)
         first += len(used)
     return facing(*(np.concatenate(part) for part in (points, normals, faces, uvs)))  # type: ignore[arg-type]
 
@@ -136,9 +154,10 @@ def sweep(
     points = line[:, None] + offsets * scales[:, None, None]
     if closed:
         faces = grid_faces(count, around, wrap=True)
-        last = np.array([[(count - 1) * around + k, (count - 1) * around + (k + 1) % around, (k + 1) % around, k]
-                         for k in range(around)])
-        faces = np.concatenate([faces, last[:, [0, 1, 2]], last[:, [0, 2, 3]]])
+        here, there = np.arange(around), (np.arange(around) + 1) % around
+        end = (count - 1) * around
+        seam = np.stack([end + here, end + there, there, end + here, there, here], 1)
+        faces = np.concatenate([faces, seam.reshape(-1, 3)])
         flat_points = points.reshape(-1, 3)
         outward = (offsets / np.linalg.norm(offsets, axis=2, keepdims=True)).reshape(-1, 3)
         return smoothed(facing(flat_points, outward, faces))
@@ -202,7 +221,7 @@ def pillow(width: float, height: float, thickness: float, cells: int = 10, pinch
     sheet = grid_faces(cells + 1, cells + 1, radial=True)
     faces = np.concatenate([sheet, number[sheet][:, ::-1]])
     hint = np.concatenate([front * 0 + [0, 0, 1.0], back[~rim] * 0 + [0, 0, -1.0]])
-    hint[: count][rim] = unit(front[rim] + 1e-9) * 1e-3
+    hint[:count][rim] = unit(front[rim] + 1e-9) * 1e-3
     return smoothed(facing(points, hint, faces))
 
 
@@ -233,9 +252,9 @@ def plane(width: float, depth: float, cells: tuple[int, int] = (1, 1)) -> Mesh:
     return facing(points, np.tile([0.0, 1.0, 0.0], (len(points), 1)), faces, uvs)
 
 
-def leg(top: Point, foot: Point, thick: float, thin: float, around: int = 10, rings: int = 6) -> Mesh:
+def leg(top: Point, foot: Point, thick: float, thin: float, around: int = 8, rings: int = 5) -> Mesh:
     """A round leg from `top` to `foot`, tapering from diameter `thick` to `thin`."""
     t = np.linspace(0, 1, rings)[:, None]
     path = np.array(top) * (1 - t) + np.array(foot) * t
-    scale = np.interp(t[:, 0], [0, 0.15, 1], [thick, thick, thin])
+    scale = np.interp(t[:, 0], [0, 0.2, 1], [thick, thick, thin])
     return sweep(path, circle(around, 1.0, 1.0), scale, up=(0.0, 0.0, 1.0), round_ends=False)

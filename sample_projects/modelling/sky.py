@@ -67,9 +67,7 @@ OZONE = np.array(
     ]
 )
 WATER_AT = np.array([689.0, *range(690, 810, 10)])
-WATER = np.array(
-    [0.0, 0.016, 0.024, 0.0125, 1.0, 0.87, 0.061, 1e-3, 1e-5, 1e-5, 6e-4, 0.0175, 0.036]
-)
+WATER = np.array([0.0, 0.016, 0.024, 0.0125, 1.0, 0.87, 0.061, 1e-3, 1e-5, 1e-5, 6e-4, 0.0175, 0.036])
 
 
 @dataclass(frozen=True)
@@ -84,8 +82,9 @@ class Sky:
         cos_theta = np.maximum(directions[:, 1], 1e-3)
         flat = directions * [1.0, 0.0, 1.0]
         below = directions[:, 1] < 1e-3
-        lifted = np.where(below[:, None], flat / np.maximum(np.linalg.norm(flat, axis=1), 1e-9)[:, None],
-                          directions)
+        lifted = np.where(
+            below[:, None], flat / np.maximum(np.linalg.norm(flat, axis=1), 1e-9)[:, None], directions
+        )
         gamma = np.arccos(np.clip(lifted @ np.array(self.sun), -1, 1))
         sun_theta = math.acos(self.sun[1])
         zenith = self.zenith()
@@ -96,7 +95,7 @@ class Sky:
         ]
         luminance, x, y = (zenith[k] * ratio[k] for k in range(3))
         xyz = np.stack([x / y, np.ones_like(x), (1 - x - y) / y], 1) * luminance[:, None]
-        return np.maximum(xyz @ TO_RGB.T, 0.0)
+        return np.asarray(np.maximum(xyz @ TO_RGB.T, 0.0))
 
     def zenith(self) -> Point:
         """Luminance (kcd/m²) and chromaticity x, y straight up."""

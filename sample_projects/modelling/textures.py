@@ -27,7 +27,9 @@ def _enlarged(grid: Array, count: int) -> Array:
     base = np.floor(t).astype(np.int64)
     f = (t - base)[:, None]
     weights = ((1 - f) ** 3, 3 * f**3 - 6 * f**2 + 4, -3 * f**3 + 3 * f**2 + 3 * f + 1, f**3)
-    return np.asarray(sum(w / 6 * grid[(base + o) % len(grid)] for w, o in zip(weights, (-1, 0, 1, 2), strict=True)))
+    return np.asarray(
+        sum(w / 6 * grid[(base + o) % len(grid)] for w, o in zip(weights, (-1, 0, 1, 2), strict=True))
+    )
 
 
 def encoded(linear: Array, steps: int = 2) -> Image:
@@ -93,21 +95,37 @@ def weave(width: int = 512, height: int = 384, seed: int = 8) -> Image:
     colour = np.broadcast_to(cream, (height, width, 3))
     for mask, paint in ((rust * field, clay), (dark * field, ink), (band, ink)):
         colour = colour * (1 - mask[..., None]) + paint * mask[..., None]
-    knots = 1 + 0.07 * np.sin(2 * np.pi * v * height / 4) * np.sin(2 * np.pi * (u * width / 4 + 0.5 * (v * height // 4)))
-    wool = 1 + 0.07 * noise((height, width), (90, 120), seed + 1, 1) + 0.05 * noise((height, width), (8, 10), seed + 2, 2)
+    knots = 1 + 0.07 * np.sin(2 * np.pi * v * height / 4) * np.sin(
+        2 * np.pi * (u * width / 4 + 0.5 * (v * height // 4))
+    )
+    wool = (
+        1
+        + 0.07 * noise((height, width), (90, 120), seed + 1, 1)
+        + 0.05 * noise((height, width), (8, 10), seed + 2, 2)
+    )
     return encoded(colour * (knots * wool)[..., None], 3)
 
 
 def abstract_print(width: int = 320, height: int = 256, seed: int = 4) -> Image:
     """A print of arches and a disc in earth colours on sand, on white paper."""
     y, x = np.meshgrid(
-        (np.arange(4 * height) + 0.5) / (4 * height), (np.arange(4 * width) + 0.5) / (4 * width) * width / height, indexing="ij"
+        (np.arange(4 * height) + 0.5) / (4 * height),
+        (np.arange(4 * width) + 0.5) / (4 * width) * width / height,
+        indexing="ij",
     )
     aspect = width / height
     shapes = (
         ((x - 0.40 * aspect) ** 2 + (y - 0.36) ** 2 < 0.135**2, (0.52, 0.17, 0.075)),
-        ((np.hypot(x - 0.62 * aspect, (y - 0.60)) < 0.27) & (y < 0.60) | (np.abs(x - 0.62 * aspect) < 0.27) & (y >= 0.60) & (y < 0.86), (0.16, 0.21, 0.17)),
-        ((np.hypot(x - 0.62 * aspect, (y - 0.64)) < 0.16) & (y < 0.64) | (np.abs(x - 0.62 * aspect) < 0.16) & (y >= 0.64) & (y < 0.86), (0.66, 0.56, 0.42)),
+        (
+            (np.hypot(x - 0.62 * aspect, (y - 0.60)) < 0.27) & (y < 0.60)
+            | (np.abs(x - 0.62 * aspect) < 0.27) & (y >= 0.60) & (y < 0.86),
+            (0.16, 0.21, 0.17),
+        ),
+        (
+            (np.hypot(x - 0.62 * aspect, (y - 0.64)) < 0.16) & (y < 0.64)
+            | (np.abs(x - 0.62 * aspect) < 0.16) & (y >= 0.64) & (y < 0.86),
+            (0.66, 0.56, 0.42),
+        ),
         ((np.hypot(x - 0.30 * aspect, (y - 0.86)) < 0.2) & (y < 0.86), (0.10, 0.15, 0.22)),
         ((np.abs(y - 0.875) < 0.012) & (np.abs(x - 0.5 * aspect) < 0.40 * aspect), (0.10, 0.10, 0.10)),
     )
@@ -118,3 +136,25 @@ def abstract_print(width: int = 320, height: int = 256, seed: int = 4) -> Image:
     colour[margin] = (0.78, 0.77, 0.74)
     small = colour.reshape(height, 4, width, 4, 3).mean(axis=(1, 3))
     return encoded(small * (1 + 0.02 * noise((height, width), (64, 80), seed, 1))[..., None], 3)
+
+
+def slabs(size: int = 512, rows: int = 6, seed: int = 17) -> Image:
+    """Pale stone slabs in running bond, three to a row, with dark joints; repeats both ways."""
+    rng = np.random.default_rng(seed)
+    v, u = np.meshgrid((np.arange(size) + 0.5) / size, (np.arange(size) + 0.5) / size, indexing="ij")
+    row = np.floor(v * rows).astype(np.int64)
+    across = (u + (row % 2) / 6) % 1.0 * 3
+    slab = row * 3 + np.floor(across).astype(np.int64)
+    tone = rng.normal(0, 1, 3 * rows)[slab]
+    cloud = noise((size, size), (9, 9), seed, 4)
+    pores = noise((size, size), (128, 128), seed + 1, 1)
+    value = 1 + 0.05 * tone + 0.06 * cloud + 0.035 * pores
+    warm = rng.normal(0, 0.02, 3 * rows)[slab]
+    colour = (
+        np.array([0.47, 0.425, 0.36])
+        * value[..., None]
+        * np.stack([1 + warm, np.ones_like(warm), 1 - warm], -1)
+    )
+    in_row, in_column = v * rows % 1.0, across % 1.0
+    joint = np.minimum(np.minimum(in_row, 1 - in_row) / rows, np.minimum(in_column, 1 - in_column) / 3) * size
+    return encoded(colour * np.clip(0.4 + 0.35 * joint, 0, 1)[..., None], 3)
