@@ -11,16 +11,18 @@ import numpy as np
 import numpy.typing as npt
 
 from studio_core.arrays import readonly
+from studio_core.scene.bisection import longest, split
 from studio_core.scene.geometry import Geometry
 from studio_core.scene.normals import NONE, Fan, fan
 from studio_core.scene.surface import surface
-from studio_core.scene.tessellate import Estimate, longest, split, subdivide
+from studio_core.scene.tessellate import Estimate, subdivide
 from studio_core.scene.topology import Floats, Ints, edges, ranks
 
 CREASE_DEGREES = 40.0  # between the 36° of a ten-sided column and the 45° of a chamfer
 BUDGET = 30_000
 LIMIT = 2_000_000
 INSET = 1e-3
+EDGE_STEPS = 16
 NO_BACK = 0xFFFFFFFF
 
 F32 = npt.NDArray[np.float32]
@@ -263,8 +265,9 @@ def choose_edge(
 
     Where the sources alone take more than three quarters of the budget, a quarter of it is still given to
     splitting: a floor of two triangles beside one heavy armchair is not left unshaded. The estimate of each
-    geometry is corrected once by splitting it. An edge as large as the largest object where nothing needs
-    splitting; 1.0 without objects. Raises ValueError when the budget is under 1.
+    geometry is corrected once by splitting it. The edge is rounded up to a sixteenth of an octave, so that
+    most small additions to a scene leave the other meshes as they are. 1.0 without objects. Raises
+    ValueError when the budget is under 1.
     """
     if budget < 1:
         raise ValueError("the vertex budget must be positive")
@@ -287,20 +290,13 @@ def choose_edge(
         return made
 
     chosen = _largest_within(total, largest, allowed)
-    for _ in range(2):
-        tried: dict[str, tuple[float, float]] = {}
-        for key, scale in uses:
-            if key in tried:
-                continue
-            guess = expected[key].at(chosen / scale) - expected[key].vertices
-            if guess > 0.02 * allowed:
-                real = len(subdivide(bases[key], chosen / scale).weld) - expected[key].vertices
-                tried[key] = (real, guess)
-                factor[key] = real / guess
-        before, chosen = chosen, _largest_within(total, largest, allowed)
-        if abs(chosen / before - 1) < 0.05:
-            break
-    return chosen
+    finest = {key: min(chosen / scale for other, scale in uses if other == key) for key, _ in uses}
+    for key, edge in finest.items():
+        guess = expected[key].at(edge) - expected[key].vertices
+        if guess > 0.02 * allowed:
+            factor[key] = (len(subdivide(bases[key], edge).weld) - expected[key].vertices) / guess
+    chosen = _largest_within(total, largest, allowed)
+    return float(2 ** (math.ceil(EDGE_STEPS * math.log2(chosen)) / EDGE_STEPS))
 
 
 def _largest_within(total: Callable[[float], float], largest: float, allowed: float) -> float:

@@ -137,7 +137,7 @@ def partners(points: Floats, faces: Ints, made: Edges) -> Ints:
     many = np.flatnonzero((made.count > 2) & (made.count % 2 == 0))
     if not len(many):
         return found
-    half = made.order[np.repeat(made.start[many], made.count[many]) + _counting(made.count[many])]
+    half = made.order[np.repeat(made.start[many], made.count[many]) + counting(made.count[many])]
     row = np.repeat(np.arange(len(many)), made.count[many])
     begin = np.concatenate([[0], np.cumsum(made.count[many])[:-1]])
     low = points[made.ends[many[row], 0]]
@@ -162,7 +162,7 @@ def partners(points: Floats, faces: Ints, made: Edges) -> Ints:
     return found
 
 
-def _counting(counts: Ints) -> Ints:
+def counting(counts: Ints) -> Ints:
     """0, 1, … counts[0] - 1, 0, 1, … for each count."""
     ends = np.cumsum(counts)
     return np.arange(int(ends[-1]) if len(ends) else 0) - np.repeat(ends - counts, counts)
@@ -227,6 +227,6 @@ def _near_edges(
     if sum(int(count.sum()) for _, _, count in spans) > PAIR_LIMIT:
         return []
     return [
-        (np.repeat(who, count), order[np.repeat(begin, count) + _counting(count)])
+        (np.repeat(who, count), order[np.repeat(begin, count) + counting(count)])
         for who, begin, count in spans
     ]
