@@ -18,12 +18,13 @@ from studio_core.shading.frame import Frame
 from studio_core.shading.job import Job
 from studio_core.shading.materials import Resolved, coefficients, resolve
 from studio_core.shading.pipeline import Inputs
-from studio_core.shading.stages import sample_directions
+from studio_core.shading.stages import pinhole
 
 F32 = npt.NDArray[np.float32]
 I64 = npt.NDArray[np.int64]
 
 CHUNK = 1 << 15
+EVERY = np.zeros(0, np.int64)
 _LEVELS = 12
 
 
@@ -114,7 +115,7 @@ def compose(
 ) -> Picture:
     """Linear (H, W, 3) with the environment behind where it is to be seen."""
     surfaces, view = radiance.surfaces, hits.view
-    samples = _Compositor(scene, radiance, view, table, workers, job)(hits, sample_directions(view))
+    samples = _Compositor(scene, radiance, view, table, workers, job)(hits, EVERY)
     n2 = hits.samples**2
     shape = (view.height, view.width)
     linear = samples.reshape(*shape, n2, 3).mean(axis=2, dtype=np.float32)
@@ -145,14 +146,14 @@ class _Compositor:
         self.terms = radiance.combined(lights).reshape(-1, TERMS * 3)
         self.table = table
         self.texels = _texels_per_metre(self.surfaces, table)
-        pixels = view.height * view.antialias
-        self.pixel_angle = float(2 * np.tan(np.radians(view.fov) / 2) / pixels)
+        self.pinhole = pinhole(view)
+        self.pixel_angle = float(2 * self.pinhole[3] / (view.height * view.antialias))
         self.workers, self.job = workers, job
 
-    def __call__(self, hits: Hits, directions: F32) -> F32:
-        """(N, 3) for samples looking along `directions` (N, 3)."""
-        out = np.zeros((len(directions), 3), np.float32)
-        self._background(hits, directions, out)
+    def __call__(self, hits: Hits, samples: I64) -> F32:
+        """(N, 3) radiance of hits that belong to `samples` of the picture."""
+        out = np.zeros((len(hits.face), 3), np.float32)
+        self._background(hits, samples, out)
         mesh, table = self.surfaces.mesh, self.table
 
         def shade(start: int, stop: int) -> None:
@@ -163,7 +164,8 @@ class _Compositor:
                 hits.u,
                 hits.v,
                 hits.distance,
-                directions,
+                samples,
+                self.pinhole,
                 mesh.faces,
                 mesh.back_faces,
                 mesh.geometric,
@@ -179,28 +181,25 @@ class _Compositor:
                 out,
             )
 
-        self.workers.run(len(directions), CHUNK, shade, self.job)
+        self.workers.run(len(hits.face), CHUNK, shade, self.job)
         for index, rest in hits.behind:
-            under = self(rest, np.ascontiguousarray(directions[index]))
+            under = self(rest, samples[index] if len(samples) else index)
             slot = mesh.face_material[hits.face[index]]
             alpha = self.surfaces.opacity[slot][:, None]
             out[index] = alpha * out[index] + (1 - alpha) * under
         return out
 
-    def _background(self, hits: Hits, directions: F32, out: F32) -> None:
-        empty = np.flatnonzero(hits.face < 0)
-        if self.environment is None or not len(empty):
+    def _background(self, hits: Hits, samples: I64, out: F32) -> None:
+        if self.environment is None:
             return
         rotation = np.ascontiguousarray(self.environment.rotation().matrix()[:3, :3].T, np.float32)
         pixels = np.ascontiguousarray(self.environment.image.pixels[..., :3], np.float32)
         gain = np.array(self.environment.gain(), np.float32)
-        towards, seen = np.ascontiguousarray(directions[empty]), np.empty((len(empty), 3), np.float32)
 
         def look(start: int, stop: int) -> None:
-            background_samples(start, stop, towards, rotation, pixels, gain, seen)
+            background_samples(start, stop, hits.face, samples, self.pinhole, rotation, pixels, gain, out)
 
-        self.workers.run(len(empty), CHUNK, look, self.job)
-        out[empty] = seen
+        self.workers.run(len(hits.face), CHUNK, look, self.job)
 
 
 def _texels_per_metre(surfaces: Surfaces, table: Coefficients) -> F32:

@@ -6,8 +6,10 @@ import numpy as np
 import numpy.typing as npt
 
 from studio_core.jit import kernel
+from studio_core.kernels.camera import sample_direction
 
 F32 = npt.NDArray[np.float32]
+F64 = npt.NDArray[np.float64]
 I32 = npt.NDArray[np.int32]
 I64 = npt.NDArray[np.int64]
 U32 = npt.NDArray[np.uint32]
@@ -39,7 +41,8 @@ def shade_samples(
     u: F32,
     v: F32,
     distance: F32,
-    directions: F32,
+    samples: I64,
+    pinhole: F64,
     faces: U32,
     back_faces: U32,
     geometric: F32,
@@ -54,44 +57,38 @@ def shade_samples(
     pixel_angle: float,
     out: F32,
 ) -> None:
-    """Radiance (N, 3) of samples[start:stop]; those that meet nothing are left alone.
+    """Radiance (N, 3) of hits start … stop−1; those that meet nothing are left alone.
 
+    samples (N,) names their samples of the picture; empty: hit i is sample i.
     terms (V, T·3) are light sums with gains; table (rows, T·3) holds coefficients of all materials and
     mip levels: material m has levels `first[m, l]` of size `size[m, l] = (height, width)`, of which those
     with height 0 do not exist; uv_scale (M, 4) scale and offset; texels_per_metre (F,) at level 0.
     """
     width = terms.shape[1]
     found = np.empty(width, np.float32)
+    along = np.empty(3, np.float32)
     for n in range(start, stop):
         f = face[n]
         if f < 0:
             continue
+        sample_direction(pinhole, samples[n] if len(samples) else n, along)
         i, j, k = faces[f, 0], faces[f, 1], faces[f, 2]
         w1, w2 = u[n], v[n]
         w0 = np.float32(1) - w1 - w2
         m = material[i]
         first_level = first[m, 0]
+        away = along[0] * geometric[i, 0] + along[1] * geometric[i, 1] + along[2] * geometric[i, 2]
         if size[m, 0, 0] == 1 and size[m, 0, 1] == 1:
             for c in range(width):
                 found[c] = table[first_level, c]
         else:
             tu = (w0 * uvs[i, 0] + w1 * uvs[j, 0] + w2 * uvs[k, 0]) * uv_scale[m, 0] + uv_scale[m, 2]
             tv = (w0 * uvs[i, 1] + w1 * uvs[j, 1] + w2 * uvs[k, 1]) * uv_scale[m, 1] + uv_scale[m, 3]
-            facing = abs(
-                directions[n, 0] * geometric[i, 0]
-                + directions[n, 1] * geometric[i, 1]
-                + directions[n, 2] * geometric[i, 2]
-            )
-            footprint = distance[n] * pixel_angle * texels_per_metre[f] / np.sqrt(max(facing, 0.05))
+            footprint = distance[n] * pixel_angle * texels_per_metre[f] / np.sqrt(max(abs(away), 0.05))
             level = int(np.floor(np.log2(max(footprint, 1.0)) + 0.5))
             while level > 0 and (level >= first.shape[1] or size[m, level, 0] == 0):
                 level -= 1
             texel(table, first[m, level], size[m, level, 0], size[m, level, 1], tu, tv, found)
-        away = (
-            directions[n, 0] * geometric[i, 0]
-            + directions[n, 1] * geometric[i, 1]
-            + directions[n, 2] * geometric[i, 2]
-        )
         if away > 0 and back_faces[f, 0] != NO_FACE:
             i, j, k = back_faces[f, 0], back_faces[f, 1], back_faces[f, 2]
         red, green, blue = np.float32(0), np.float32(0), np.float32(0)
@@ -104,26 +101,29 @@ def shade_samples(
 
 @kernel
 def background_samples(
-    start: int, stop: int, directions: F32, rotation: F32, pixels: F32, gain: F32, out: F32
+    start: int,
+    stop: int,
+    face: I32,
+    samples: I64,
+    pinhole: F64,
+    rotation: F32,
+    pixels: F32,
+    gain: F32,
+    out: F32,
 ) -> None:
-    """Bilinear radiance of an equirectangular picture for every sample; rotation is picture from world."""
+    """Bilinear radiance of an equirectangular picture where hits start … stop−1 meet nothing.
+
+    rotation (3, 3) is picture from world; `samples` as in `shade_samples`.
+    """
     height, width = pixels.shape[0], pixels.shape[1]
+    d = np.empty(3, np.float32)
     for n in range(start, stop):
-        x = (
-            rotation[0, 0] * directions[n, 0]
-            + rotation[0, 1] * directions[n, 1]
-            + rotation[0, 2] * directions[n, 2]
-        )
-        y = (
-            rotation[1, 0] * directions[n, 0]
-            + rotation[1, 1] * directions[n, 1]
-            + rotation[1, 2] * directions[n, 2]
-        )
-        z = (
-            rotation[2, 0] * directions[n, 0]
-            + rotation[2, 1] * directions[n, 1]
-            + rotation[2, 2] * directions[n, 2]
-        )
+        if face[n] >= 0:
+            continue
+        sample_direction(pinhole, samples[n] if len(samples) else n, d)
+        x = rotation[0, 0] * d[0] + rotation[0, 1] * d[1] + rotation[0, 2] * d[2]
+        y = rotation[1, 0] * d[0] + rotation[1, 1] * d[1] + rotation[1, 2] * d[2]
+        z = rotation[2, 0] * d[0] + rotation[2, 1] * d[1] + rotation[2, 2] * d[2]
         s = (0.5 - np.arctan2(x, z) / (2 * np.pi)) * width - 0.5
         t = np.arccos(min(max(y, -1.0), 1.0)) / np.pi * height - 0.5
         s0, t0 = np.floor(s), np.floor(t)

@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from studio_core.contract import Services
+from studio_core.kernels.camera import first_hits, sample_directions
 from studio_core.kernels.light_tree import LightTree, integrate_environment
 from studio_core.kernels.raycast import CasterObject, RayCaster
 from studio_core.params import param
@@ -27,6 +28,7 @@ from studio_core.shading.materials import same_shapes, shapes
 from studio_core.shading.pipeline import Inputs
 
 BODIES = Aspect.STRUCTURE | Aspect.GEOMETRY
+CHUNK = 1 << 14
 LAYERS = 6  # most transparent surfaces looked through
 FINEST = 15  # direction sets up to 2^15 share one integration of the environment
 
@@ -182,64 +184,82 @@ class PrimaryStage:
 
     def run(self, frame: Frame, inputs: Inputs, job: Job) -> Hits:
         """Primary rays, followed on through transparent surfaces."""
-        surfaces, caster = inputs[Surfaces], inputs[Casters].primary
-        directions = sample_directions(frame.view)
-        origins = np.broadcast_to(np.asarray(frame.view.transform.translation, np.float64), directions.shape)
-        return self._look(frame.view, surfaces, caster, origins, directions, 0, job)
+        surfaces, caster, view = inputs[Surfaces], inputs[Casters].primary, frame.view
+        lens = pinhole(view)
+        count = view.width * view.height * view.antialias**2
+        face = np.empty(count, np.int32)
+        u, v, distance = np.empty((3, count), np.float32)
+        eye = caster.local(view.transform.translation)
+        handles, offsets = caster.handles(), surfaces.mesh.face_offsets
 
-    def _look(
+        def look(start: int, stop: int) -> None:
+            first_hits(
+                handles.intersect8,
+                handles.scene,
+                eye,
+                lens,
+                handles.face_start,
+                handles.face_ids,
+                offsets,
+                face,
+                u,
+                v,
+                distance,
+                start,
+                stop,
+            )
+
+        self._workers.run(count, CHUNK, look, job)
+        caster.count(count)
+        seen = Hits(view, view.antialias, face, u, v, distance)
+        everything = np.arange(count) if (surfaces.opacity < 1).any() else np.zeros(0, np.int64)
+        return self._beyond(seen, surfaces, caster, everything, lens, 0, job)
+
+    def _beyond(
         self,
-        view: View,
+        hits: Hits,
         surfaces: Surfaces,
         caster: RayCaster,
-        origins: npt.NDArray[np.float64],
-        directions: npt.NDArray[np.float32],
+        samples: npt.NDArray[np.int64],
+        lens: npt.NDArray[np.float64],
         depth: int,
         job: Job,
     ) -> Hits:
-        job.checkpoint()
-        found = caster.closest(origins, directions, 0.0, np.inf, self._workers, job)
+        """The hits with what is seen through those on transparent surfaces."""
         mesh = surfaces.mesh
+        if depth == LAYERS or not len(samples):
+            return hits
+        clear = surfaces.opacity[mesh.face_material[np.maximum(hits.face, 0)]] < 1
+        through = np.flatnonzero((hits.face >= 0) & clear)
+        if not len(through):
+            return hits
+        directions = np.empty((len(through), 3), np.float32)
+        sample_directions(lens, samples[through], directions)
+        gone = hits.distance[through].astype(np.float64) * (1 + 1e-5) + caster.epsilon
+        origins = np.asarray(hits.view.transform.translation) + gone[:, None] * directions
+        found = caster.closest(origins, directions, 0.0, np.inf, self._workers, job)
         hit = found.object >= 0
-        face = np.full(len(directions), -1, np.int32)
-        face[hit] = mesh.face_offsets[found.object[hit]] + found.face[hit]
-        behind: tuple[tuple[npt.NDArray[np.int64], Hits], ...] = ()
-        if depth < LAYERS and (surfaces.opacity < 1).any():
-            slot = mesh.face_material[np.maximum(face, 0)]
-            through = np.flatnonzero(hit & (surfaces.opacity[slot] < 1))
-            if len(through):
-                gone = found.t[through].astype(np.float64) * (1 + 1e-5) + caster.epsilon
-                beyond = origins[through] + gone[:, None] * directions[through]
-                rest = self._look(view, surfaces, caster, beyond, directions[through], depth + 1, job)
-                behind = ((through, _farther(rest, gone.astype(np.float32))),)
-        return Hits(view, view.antialias, face, found.u, found.v, found.t, behind)
+        face = np.where(hit, mesh.face_offsets[found.object] + found.face, -1).astype(np.int32)
+        distance = (found.t + gone).astype(np.float32)
+        rest = Hits(hits.view, hits.samples, face, found.u, found.v, distance)
+        rest = self._beyond(rest, surfaces, caster, samples[through], lens, depth + 1, job)
+        return dataclasses.replace(hits, behind=((through, rest),))
 
 
-def _farther(hits: Hits, gone: npt.NDArray[np.float32]) -> Hits:
-    return dataclasses.replace(hits, distance=hits.distance + gone)
-
-
-def sample_directions(view: View) -> npt.NDArray[np.float32]:
-    """(H·W·n², 3) unit world directions: pixels row by row from the top left, n×n samples in each."""
-    n = view.antialias
-    top = np.tan(np.radians(view.fov) / 2)
-    right = top * view.width / view.height
-    x = (np.arange(view.width * n) + 0.5) / (view.width * n) * 2 - 1
-    y = 1 - (np.arange(view.height * n) + 0.5) / (view.height * n) * 2
-    grid = np.empty((view.height, n, view.width, n, 3), np.float64)
-    grid[..., 0] = (x * right).reshape(1, 1, view.width, n)
-    grid[..., 1] = (y * top).reshape(view.height, n, 1, 1)
-    grid[..., 2] = -1
-    flat = grid.transpose(0, 2, 1, 3, 4).reshape(-1, 3)
-    flat /= np.linalg.norm(flat, axis=1, keepdims=True)
+def pinhole(view: View) -> npt.NDArray[np.float64]:
+    """A view as `kernels.camera` wants it."""
+    up = np.tan(np.radians(view.fov) / 2)
     rotation = view.transform.matrix()[:3, :3] / view.transform.scale
-    return (flat @ rotation.T).astype(np.float32)
+    size = (view.width, view.antialias, up * view.width / view.height, up, view.height)
+    return np.array([*size, *rotation.ravel()], np.float64)
 
 
 def visible_vertices(surfaces: Surfaces, hits: Hits) -> npt.NDArray[np.bool_]:
     """(V,) the corners of every face that a sample sees, on the side it sees."""
     seen = np.zeros(len(surfaces.mesh.positions), np.bool_)
-    faces = np.unique(hits.face[hits.face >= 0])
+    touched = np.zeros(len(surfaces.mesh.faces) + 1, np.bool_)
+    touched[hits.face] = True  # -1, nothing, marks the one too many
+    faces = np.flatnonzero(touched[:-1])
     seen[surfaces.mesh.faces[faces]] = True
     back = surfaces.mesh.back_faces[faces]
     seen[back[back[:, 0] != NO_BACK]] = True

@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from oracles.radiance import bilinear_repeat, lat_long
 
+from studio_core.kernels.camera import sample_directions
 from studio_core.kernels.compose import background_samples, shade_samples, texel
+from studio_core.scene.transform import looking
+from studio_core.session import View
+from studio_core.shading.stages import pinhole
 
 
 @given(
@@ -22,18 +27,38 @@ def test_texel_is_bilinear_and_repeats(height, width, u, v):
     np.testing.assert_allclose(out, bilinear_repeat(map_.astype(np.float64), u, v), atol=2e-5)
 
 
-def test_background_equals_the_oracle():
+@pytest.mark.parametrize("named", [False, True])
+def test_background_equals_the_oracle(named):
     rng = np.random.default_rng(1)
     pixels = rng.random((8, 16, 3)).astype(np.float32)
-    directions = rng.normal(size=(200, 3))
-    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
-    directions = np.concatenate([directions, [[0, 1, 0], [0, -1, 0], [0, 0, -1]]]).astype(np.float32)
     turn = np.linalg.qr(rng.normal(size=(3, 3)))[0].astype(np.float32)
     gain = np.array([1, 2, 3], np.float32)
-    out = np.zeros((len(directions), 3), np.float32)
-    background_samples(0, len(directions), directions, turn, pixels, gain, out)
-    for d, made in zip(directions, out, strict=True):
-        np.testing.assert_allclose(made, lat_long(pixels, turn @ d) * gain, atol=2e-3)
+    lens = pinhole(View(looking((0, 0, 0), (1, -2, 0.5)), fov=150, width=9, height=6, antialias=2))
+    samples = rng.permutation(9 * 6 * 4)[:50] if named else np.arange(9 * 6 * 4)
+    directions = np.empty((len(samples), 3), np.float32)
+    sample_directions(lens, samples, directions)
+    face = np.where(np.arange(len(samples)) % 5 == 0, 3, -1).astype(np.int32)
+    out = np.full((len(samples), 3), -1, np.float32)
+    given = samples if named else np.zeros(0, np.int64)
+    background_samples(0, len(samples), face, given, lens, turn, pixels, gain, out)
+    for d, f, made in zip(directions, face, out, strict=True):
+        expected = -1 if f >= 0 else lat_long(pixels, turn @ d) * gain
+        np.testing.assert_allclose(made, expected, atol=2e-3)
+
+
+def test_samples_are_ordered_by_pixel_and_lie_in_it():
+    view = View(looking((0, 1, 2), (0.3, 0, 0)), fov=60, width=4, height=3, antialias=2)
+    out = np.empty((4 * 3 * 4, 3), np.float32)
+    sample_directions(pinhole(view), np.arange(len(out)), out)
+    np.testing.assert_allclose(np.linalg.norm(out, axis=1), 1, rtol=1e-6)
+    own = out @ view.transform.matrix()[:3, :3]
+    up = np.tan(np.radians(30))
+    x = (own[:, 0] / -own[:, 2] / (up * 4 / 3) + 1) / 2 * 4
+    y = (1 - own[:, 1] / -own[:, 2] / up) / 2 * 3
+    pixel = np.arange(len(out)) // 4
+    np.testing.assert_array_equal(np.floor(x), pixel % 4)
+    np.testing.assert_array_equal(np.floor(y), pixel // 4)
+    np.testing.assert_allclose(x.reshape(-1, 4).mean(axis=1) % 1, 0.5, atol=1e-4)
 
 
 def _one_triangle():
@@ -55,7 +80,8 @@ def _shade(direction, table, first, size, *, face=0):
         np.array([0.25], np.float32),
         np.array([0.5], np.float32),
         np.array([1], np.float32),
-        np.array([direction], np.float32),
+        np.zeros(0, np.int64),
+        pinhole(View(looking((0, 0, 0), direction), fov=1e-3, width=1, height=1, antialias=1)),
         faces,
         back,
         geometric,
