@@ -91,7 +91,7 @@ def _write(
         raise InputError(f"{path} cannot be written: there is no folder {path.parent}")
     beside = path.with_name(f".{path.stem[:40]}-{secrets.token_hex(6)}{suffix}")
     try:
-        output = oiio.ImageOutput.create(suffix)
+        output = oiio.ImageOutput.create(str(beside))
         if output is None:
             raise InputError(f"{path} cannot be written: {_line(oiio.geterror())}")
         done = output.open(str(beside), spec) and output.write_image(np.ascontiguousarray(pixels))
