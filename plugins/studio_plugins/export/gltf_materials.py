@@ -1,0 +1,170 @@
+"""Materials for glTF 2.0: metallic-roughness, as near as it comes.
+
+=============  =====================================================================================
+model          glTF
+=============  =====================================================================================
+lambert        dielectric of roughness 1; its reflection switched off by KHR_materials_specular
+ggx            baseColor, metallic, roughness as they are; KHR_materials_ior where specular ≠ 0.5
+phong          roughness = √α with α² = 2 / (4n + 2); blinn-phong: α² = 2 / (n + 2). Highlight colours
+blinn-phong    become F0 of a dielectric (KHR_materials_specular), or a metal where there is no matte part
+any other      dielectric of roughness 1 in its mean colour, with a note
+=============  =====================================================================================
+
+All are double-sided; opacity below 1 is blended. Texture scale and offset become KHR_texture_transform.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from studio_core.contract import Registry
+from studio_core.imaging.encode import encode_png
+from studio_core.imaging.transfer import linear_to_srgb
+from studio_core.scene.geometry import Image, Texture
+from studio_core.scene.nodes import Material, MaterialId, Scene
+from studio_core.shading.materials import Resolved, linear, resolve
+from studio_plugins.export.gltf_buffer import Buffer
+
+NO_MATTE = 0.02  # albedo under which a Phong material counts as metal
+Json = dict[str, Any]
+
+
+@dataclass
+class Materials:
+    """Writes materials and textures once each."""
+
+    scene: Scene
+    registry: Registry
+    buffer: Buffer
+    materials: list[Json] = field(default_factory=list)
+    textures: list[Json] = field(default_factory=list)
+    images: list[Json] = field(default_factory=list)
+    extensions: set[str] = field(default_factory=set)
+    notes: list[str] = field(default_factory=list)
+    _known: dict[MaterialId, int] = field(default_factory=dict)
+    _pictures: dict[tuple[str, str], int] = field(default_factory=dict)
+
+    def use(self, key: MaterialId) -> int:
+        """Index of the material."""
+        if key not in self._known:
+            self._known[key] = len(self.materials)
+            self.materials.append(self._material(self.scene.material(key)))
+        return self._known[key]
+
+    def _material(self, material: Material) -> Json:
+        resolved = resolve(material, self.registry)
+        if resolved.problem:
+            self.notes.append(resolved.problem)
+        made: Json = {"name": material.name, "doubleSided": True, "extensions": {}}
+        model = resolved.brdf.id
+        if model == "lambert":
+            made["pbrMetallicRoughness"] = self._base(resolved, "base_color", 0.0, 1.0)
+            made["extensions"]["KHR_materials_specular"] = {"specularFactor": 0.0}
+        elif model == "ggx":
+            self._ggx(made, material, resolved)
+        elif model in ("phong", "blinn-phong"):
+            self._phong(made, resolved)
+            self.notes.append(f"{material.name}: glTF has no {resolved.brdf.label}; its nearest was written.")
+        else:
+            self.notes.append(f"{material.name}: glTF has no {resolved.brdf.label}; written as matte.")
+            colour = _mean_colour(resolved)
+            made["pbrMetallicRoughness"] = {
+                "baseColorFactor": colour, "metallicFactor": 0.0, "roughnessFactor": 1.0,
+            }  # fmt: skip
+        if material.opacity < 1:
+            made["alphaMode"] = "BLEND"
+            made["pbrMetallicRoughness"]["baseColorFactor"][3] = float(material.opacity)
+        self.extensions.update(made["extensions"])
+        if not made["extensions"]:
+            del made["extensions"]
+        return made
+
+    def _base(self, resolved: Resolved, source: str, metallic: float, roughness: float) -> Json:
+        made: Json = {
+            "baseColorFactor": [*_unit(resolved.values[source]), 1.0],
+            "metallicFactor": metallic,
+            "roughnessFactor": roughness,
+        }
+        if source in resolved.textures:
+            made["baseColorTexture"] = self._colour(resolved.textures[source])
+        return made
+
+    def _ggx(self, made: Json, material: Material, resolved: Resolved) -> None:
+        values: Any = resolved.values
+        base = self._base(resolved, "base_color", float(values["metallic"]), float(values["roughness"]))
+        made["pbrMetallicRoughness"] = base
+        specular = float(values["specular"])
+        if "metallic" in resolved.textures:
+            base["metallicRoughnessTexture"] = self._metallic(resolved.textures["metallic"])
+        if "specular" in resolved.textures:
+            specular *= float(linear(resolved.textures["specular"].image)[..., 0].mean())
+            self.notes.append(f"{material.name}: glTF takes one reflectance; its texture's mean was written.")
+        if specular != 0.5:
+            root = math.sqrt(0.08 * min(max(specular, 0.0), 1.0))
+            made["extensions"]["KHR_materials_ior"] = {"ior": (1 + root) / (1 - root)}
+
+    def _phong(self, made: Json, resolved: Resolved) -> None:
+        values: Any = resolved.values
+        exponent = float(values["exponent"]) * (4 if resolved.brdf.id == "phong" else 1)
+        roughness = math.sqrt(math.sqrt(2 / (exponent + 2)))
+        diffuse, specular = np.array(_unit(values["diffuse"])), np.array(_unit(values["specular"]))
+        excess = np.maximum(diffuse + specular, 1.0)
+        diffuse, specular = diffuse / excess, specular / excess
+        if diffuse.max() < NO_MATTE:
+            made["pbrMetallicRoughness"] = self._base(resolved, "specular", 1.0, roughness)
+            made["pbrMetallicRoughness"]["baseColorFactor"][:3] = specular.tolist()
+            return
+        made["pbrMetallicRoughness"] = self._base(resolved, "diffuse", 0.0, roughness)
+        matte = np.minimum(diffuse / max(1 - specular.max(), 1e-3), 1.0)
+        made["pbrMetallicRoughness"]["baseColorFactor"][:3] = matte.tolist()
+        shine: Json = {"specularColorFactor": (specular / 0.04).tolist()}
+        if "specular" in resolved.textures:
+            shine["specularColorTexture"] = self._colour(resolved.textures["specular"])
+        made["extensions"]["KHR_materials_specular"] = shine
+
+    def _colour(self, texture: Texture) -> Json:
+        return self._texture(texture, "colour", _encoded(texture.image))
+
+    def _metallic(self, texture: Texture) -> Json:
+        metal = np.clip(linear(texture.image)[..., 0], 0, 1)
+        pixels = np.full((*metal.shape, 3), 255, np.uint8)
+        pixels[..., 2] = np.rint(metal * 255)  # blue; green is roughness
+        return self._texture(texture, "metallic", pixels)
+
+    def _texture(self, texture: Texture, use: str, pixels: npt.NDArray[np.uint8]) -> Json:
+        key = (texture.image.key, use)
+        if key not in self._pictures:
+            self._pictures[key] = len(self.textures)
+            self.images.append({"bufferView": self.buffer.view(encode_png(pixels)), "mimeType": "image/png"})
+            self.textures.append({"sampler": 0, "source": len(self.images) - 1})
+        made: Json = {"index": self._pictures[key]}
+        scale, offset = texture.scale, texture.offset
+        if scale != (1.0, 1.0) or offset != (0.0, 0.0):
+            # glTF's v runs down the picture: 1 − (s v + o) = s (1 − v) + (1 − s − o).
+            moved = {"scale": list(scale), "offset": [offset[0], 1 - scale[1] - offset[1]]}
+            made["extensions"] = {"KHR_texture_transform": moved}
+            self.extensions.add("KHR_texture_transform")
+        return made
+
+
+def _unit(value: Any) -> list[float]:
+    return [min(max(float(v), 0.0), 1.0) for v in value]
+
+
+def _encoded(image: Image) -> npt.NDArray[np.uint8]:
+    """(H, W, 3) sRGB bytes; 8-bit sRGB pictures unchanged."""
+    pixels = image.pixels
+    if pixels.dtype != np.uint8 or image.encoding != "srgb":
+        pixels = linear_to_srgb(linear(image)[..., :3])
+    return np.repeat(pixels, 3, axis=2) if pixels.shape[2] == 1 else np.ascontiguousarray(pixels[..., :3])
+
+
+def _mean_colour(resolved: Resolved) -> list[float]:
+    numbers = {k: v for k, v in resolved.values.items() if not isinstance(v, str | bool)}
+    first = resolved.brdf.coefficients({k: np.asarray(v, np.float32) for k, v in numbers.items()})[0]
+    return [*_unit(first * np.pi), 1.0]

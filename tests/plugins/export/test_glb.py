@@ -1,0 +1,244 @@
+"""GLB files against the rules of glTF, and read back by trimesh."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from oracles.gltf import check, parse, read
+
+from studio_core.errors import InputError
+from studio_core.imaging.io import read_image
+from studio_core.registry import PluginHost
+from studio_core.scene.geometry import Geometry, Image, Texture
+from studio_core.scene.nodes import (
+    AreaLamp,
+    Camera,
+    DirectionalLamp,
+    Environment,
+    Group,
+    Material,
+    MeshObject,
+    PointLamp,
+    Scene,
+    SpotLamp,
+)
+from studio_core.scene.transform import Transform, looking
+from studio_plugins.export.glb import EXPORTER
+
+
+def exported(scene: Scene, host: PluginHost, folder: Path) -> tuple[dict[str, Any], bytes, tuple[str, ...]]:
+    notes = EXPORTER.save(scene, folder / "out.glb", host)
+    document, binary = parse((folder / "out.glb").read_bytes())
+    check(document, binary)
+    return document, binary, notes
+
+
+def node(document: dict[str, Any], name: str) -> dict[str, Any]:
+    return next(n for n in document["nodes"] if n["name"] == name)
+
+
+def test_hierarchy_and_instances(room: Scene, host: PluginHost, tmp_path: Path) -> None:
+    document, _, notes = exported(room, host, tmp_path)
+    assert notes == ("Sky: glTF holds no environment; it was left out.",)
+    group = node(document, "Group")
+    assert [document["nodes"][child]["name"] for child in group["children"]] == ["Left", "Right"]
+    assert node(document, "Left")["mesh"] == node(document, "Right")["mesh"]
+    alone = document["meshes"][node(document, "Alone")["mesh"]]["primitives"][0]
+    left = document["meshes"][node(document, "Left")["mesh"]]["primitives"][0]
+    assert alone["attributes"] == left["attributes"]
+    assert alone["material"] != left["material"]
+    camera = document["cameras"][node(document, "Eye")["camera"]]
+    np.testing.assert_allclose(camera["perspective"]["yfov"], np.radians(50))
+
+
+def test_trimesh_reads_what_stood_there(room: Scene, host: PluginHost, tmp_path: Path) -> None:
+    trimesh = pytest.importorskip("trimesh")
+    EXPORTER.save(room, tmp_path / "out.glb", host)
+    read_back = trimesh.load_scene(tmp_path / "out.glb")
+    for name, key in (("Left", "left"), ("Right", "right"), ("Alone", "alone"), ("Wall", "wall")):
+        matrix, mesh = read_back.graph[name]
+        original = room[key]
+        assert isinstance(original, MeshObject)
+        np.testing.assert_allclose(matrix, room.world(key).matrix(), atol=1e-6)
+        made = read_back.geometry[mesh]
+        np.testing.assert_allclose(made.vertices, original.geometry.positions, atol=1e-7)
+        np.testing.assert_array_equal(made.faces, original.geometry.faces)
+        np.testing.assert_allclose(made.vertex_normals, original.geometry.normals, atol=1e-6)
+        np.testing.assert_allclose(made.visual.uv, original.geometry.uvs, atol=1e-6)
+        colour = room.material(original.materials[0]).values["base_color"]
+        factor = np.asarray(made.visual.material.baseColorFactor, float)
+        factor = factor / 255 if factor.max() > 1 else factor
+        np.testing.assert_allclose(factor[:3], colour, atol=1 / 255)
+        assert made.visual.material.metallicFactor == 0
+        assert made.visual.material.roughnessFactor == 1
+    picture = np.asarray(read_back.geometry[read_back.graph["Wall"][1]].visual.material.baseColorTexture)
+    wall = room.material("poster").textures["base_color"].image
+    np.testing.assert_array_equal(picture, wall.pixels)
+
+
+def test_texture_coordinates_meet_the_same_texel(room: Scene, host: PluginHost, tmp_path: Path) -> None:
+    document, binary, _ = exported(room, host, tmp_path)
+    primitive = document["meshes"][node(document, "Wall")["mesh"]]["primitives"][0]
+    uv = read(document, binary, primitive["attributes"]["TEXCOORD_0"])
+    info = document["materials"][primitive["material"]]["pbrMetallicRoughness"]["baseColorTexture"]
+    moved = info["extensions"]["KHR_texture_transform"]
+    theirs = uv * moved["scale"] + np.array(moved["offset"])  # from the top left
+    texture = room.material("poster").textures["base_color"]
+    wall = room["wall"]
+    assert isinstance(wall, MeshObject)
+    ours = np.asarray(wall.geometry.uvs) * texture.scale + np.array(texture.offset)  # from the bottom left
+    np.testing.assert_allclose(theirs, np.stack([ours[:, 0], 1 - ours[:, 1]], axis=1), atol=1e-6)
+
+
+def test_lamps_are_punctual(host: PluginHost, tmp_path: Path) -> None:
+    scene = Scene().with_nodes(
+        PointLamp(id="p", name="Bulb", intensity=4.0, tint=(0.5, 1.0, 0.25)),
+        SpotLamp(id="s", name="Spot", cone=40.0, inner=40.0, transform=looking((0, 3, 0), (0, 0, 0))),
+        DirectionalLamp(id="d", name="Sun", intensity=2.0),
+        AreaLamp(id="a", name="Panel", intensity=3.0, width=2.0, height=0.5, transform=Transform(scale=2.0)),
+        PointLamp(id="o", name="Off", intensity=0.0),
+        Environment(id="e", name="Sky", image=Image(np.ones((2, 4, 3), np.float32)), luminance_scale=100.0),
+    )
+    document, _, notes = exported(scene, host, tmp_path)
+    lights = document["extensions"]["KHR_lights_punctual"]["lights"]
+    by_name = {light["name"]: light for light in lights}
+    assert by_name["Bulb"]["type"] == "point"
+    assert by_name["Bulb"]["intensity"] == 400
+    assert by_name["Bulb"]["color"] == [0.5, 1.0, 0.25]
+    np.testing.assert_allclose(by_name["Spot"]["spot"]["outerConeAngle"], np.radians(40))
+    assert by_name["Sun"]["type"] == "directional"
+    assert by_name["Panel"]["intensity"] == 3 * 4 * 100
+    for name in ("Sun", "Panel", "Off", "Sky"):
+        assert sum(name in note for note in notes) == 1, name
+
+
+def box(material: Material, mesh: Geometry) -> Scene:
+    return Scene().with_materials(material).with_nodes(MeshObject(id="box", geometry=mesh, materials=("m",)))
+
+
+@pytest.mark.parametrize("specular", [0.0, 0.25, 1.0])
+def test_ggx_keeps_its_reflectance(host: PluginHost, parts: Any, tmp_path: Path, specular: float) -> None:
+    values = {"base_color": (0.2, 0.4, 0.6), "metallic": 0.25, "roughness": 0.3, "specular": specular}
+    document, _, notes = exported(
+        box(Material(id="m", model="ggx", values=values), parts["cube"]()), host, tmp_path
+    )
+    made = document["materials"][0]
+    assert made["pbrMetallicRoughness"]["baseColorFactor"] == [0.2, 0.4, 0.6, 1.0]
+    assert made["pbrMetallicRoughness"]["metallicFactor"] == 0.25
+    assert made["pbrMetallicRoughness"]["roughnessFactor"] == 0.3
+    ior = made["extensions"]["KHR_materials_ior"]["ior"]
+    np.testing.assert_allclose(((ior - 1) / (ior + 1)) ** 2, 0.08 * specular, atol=1e-12)
+    assert notes == ()
+
+
+def test_phong_becomes_the_nearest_gloss(host: PluginHost, parts: Any, tmp_path: Path) -> None:
+    metal = {"diffuse": (0.0, 0.0, 0.0), "specular": (0.9, 0.6, 0.3), "exponent": 100.0}
+    document, _, notes = exported(
+        box(Material(id="m", model="phong", values=metal), parts["cube"]()), host, tmp_path
+    )
+    made = document["materials"][0]["pbrMetallicRoughness"]
+    assert made["metallicFactor"] == 1
+    np.testing.assert_allclose(made["baseColorFactor"][:3], (0.9, 0.6, 0.3))
+    np.testing.assert_allclose(made["roughnessFactor"] ** 4, 2 / 402)
+    assert len(notes) == 1
+    plastic = {"diffuse": (0.5, 0.5, 0.5), "specular": (0.2, 0.2, 0.2), "exponent": 400.0}
+    material = Material(id="m", model="blinn-phong", values=plastic)
+    document, _, _ = exported(box(material, parts["cube"]()), host, tmp_path)
+    made = document["materials"][0]
+    assert made["pbrMetallicRoughness"]["metallicFactor"] == 0
+    np.testing.assert_allclose(made["pbrMetallicRoughness"]["roughnessFactor"] ** 4, 2 / 402)
+    np.testing.assert_allclose(made["extensions"]["KHR_materials_specular"]["specularColorFactor"], 5.0)
+
+
+def test_textures_of_metal_and_of_light(host: PluginHost, parts: Any, tmp_path: Path) -> None:
+    pixels = np.linspace(0, 1, 12, dtype=np.float32).reshape(2, 2, 3)
+    material = Material(
+        id="m",
+        model="ggx",
+        opacity=0.5,
+        textures={"base_color": Texture(Image(pixels)), "metallic": Texture(Image(pixels[..., :1]))},
+    )
+    document, binary, _ = exported(box(material, parts["cube"]()), host, tmp_path)
+    made = document["materials"][0]
+    assert made["alphaMode"] == "BLEND"
+    assert made["pbrMetallicRoughness"]["baseColorFactor"][3] == 0.5
+    view = document["bufferViews"][document["images"][1]["bufferView"]]
+    data = binary[view["byteOffset"] :][: view["byteLength"]]
+    metal = read_image(data, "metal.png").pixels
+    np.testing.assert_array_equal(metal[..., 2], np.rint(pixels[..., 0] * 255))
+    assert (metal[..., 1] == 255).all()
+
+
+def test_meshes_without_normals_get_the_studios(host: PluginHost, parts: Any, tmp_path: Path) -> None:
+    cube = parts["cube"]()
+    corners, index = np.unique(cube.positions, axis=0, return_inverse=True)
+    plain = Geometry(corners, index.reshape(-1)[cube.faces.astype(int)].astype(np.uint32))
+    document, binary, _ = exported(box(Material(id="m"), plain), host, tmp_path)
+    attributes = document["meshes"][0]["primitives"][0]["attributes"]
+    normals = read(document, binary, attributes["NORMAL"])
+    np.testing.assert_allclose(np.abs(normals).max(axis=1), 1, atol=1e-6)  # creases: flat faces
+    positions = read(document, binary, attributes["POSITION"])
+    np.testing.assert_allclose(
+        0.5 * normals[np.abs(normals) > 0.5], positions[np.abs(normals) > 0.5], atol=1e-6
+    )
+
+
+def test_slots_are_primitives_on_the_same_vertices(host: PluginHost, parts: Any, tmp_path: Path) -> None:
+    cube = parts["cube"]()
+    slots = np.repeat([0, 1, 1], 4).astype(np.uint16)
+    mesh = Geometry(cube.positions, cube.faces, cube.normals, cube.uvs, slots)
+    scene = (
+        Scene()
+        .with_materials(Material(id="a"), Material(id="b"))
+        .with_nodes(MeshObject(id="box", geometry=mesh, materials=("a", "b")))
+    )
+    document, binary, _ = exported(scene, host, tmp_path)
+    first, second = document["meshes"][0]["primitives"]
+    assert first["attributes"] == second["attributes"]
+    assert [len(read(document, binary, p["indices"])) for p in (first, second)] == [12, 24]
+
+
+def test_large_meshes_have_wide_indices(host: PluginHost, tmp_path: Path) -> None:
+    count = 70_000
+    positions = np.random.default_rng(0).random((count, 3), np.float32)
+    normals = np.tile(np.float32([0, 0, 1]), (count, 1))
+    faces = np.arange(count - 1, dtype=np.uint32)[: 3 * (count // 3)].reshape(-1, 3)
+    document, _, _ = exported(box(Material(id="m"), Geometry(positions, faces, normals)), host, tmp_path)
+    primitive = document["meshes"][0]["primitives"][0]
+    assert document["accessors"][primitive["indices"]]["componentType"] == 5125
+
+
+def test_hidden_and_empty_things(room: Scene, host: PluginHost, parts: Any, tmp_path: Path) -> None:
+    hidden = room.with_nodes(dataclasses.replace(room["group"], hidden=True))
+    document, _, notes = exported(hidden, host, tmp_path)
+    names = {n["name"] for n in document["nodes"]}
+    assert names == {"Alone", "Wall", "Eye"}
+    assert "Hidden nodes were left out." in notes
+    nothing = Geometry(np.zeros((0, 3), np.float32), np.zeros((0, 3), np.uint32))
+    document, _, notes = exported(box(Material(id="m"), nothing), host, tmp_path)
+    assert "mesh" not in document["nodes"][0]
+    document, binary, _ = exported(Scene(), host, tmp_path)
+    assert "nodes" not in document
+    assert binary == b""
+    exported(Scene().with_nodes(Group(id="g"), Camera(id="c", name="C", parent="g")), host, tmp_path)
+
+
+def test_a_place_that_cannot_be_written_is_named(room: Scene, host: PluginHost, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="nowhere"):
+        EXPORTER.save(room, tmp_path / "nowhere" / "out.glb", host)
+    assert not list(tmp_path.iterdir())
+
+
+def test_what_hangs_on_the_sky_stays_in_place(room: Scene, host: PluginHost, tmp_path: Path) -> None:
+    sky, alone = (
+        dataclasses.replace(room[key], parent=parent) for key, parent in (("sky", None), ("alone", "sky"))
+    )
+    sky = dataclasses.replace(sky, transform=Transform((1.0, 2.0, 3.0)))
+    document, _, _ = exported(room.with_nodes(sky, alone), host, tmp_path)
+    parent = node(document, "Sky")
+    assert parent["translation"] == [1.0, 2.0, 3.0]
+    assert [document["nodes"][child]["name"] for child in parent["children"]] == ["Alone"]
