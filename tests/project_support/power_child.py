@@ -32,7 +32,7 @@ def main() -> None:
     disk.log(log)
     acknowledged = []
     for scene in scenes[1:]:
-        store.save(path, scene, way=way)
+        store.save(path, scene, way="auto" if way == "fresh" else way, fresh=way == "fresh")
         acknowledged.append(len(read_log(log)))
     disk.log(None)
     disk.disarm()

@@ -50,7 +50,7 @@ def test_every_failing_change_leaves_old_or_new(tmp_path: Path, library: Path, w
 
 
 @needs_compiler
-@pytest.mark.parametrize("way", ["in place", "whole"])
+@pytest.mark.parametrize("way", ["in place", "whole", "fresh"])
 def test_a_power_cut_loses_nothing_that_was_acknowledged(tmp_path: Path, library: Path, way: str) -> None:
     work, cut = tmp_path / "work", tmp_path / "cut"
     work.mkdir()
