@@ -96,7 +96,7 @@ soups = st.builds(
 
 
 @given(soups, st.floats(0.2, 6.0))
-@settings(max_examples=150)
+@settings(max_examples=100)
 def test_any_soup_of_triangles_is_shaded_conformingly(geometry: Geometry, edge: float) -> None:
     source = surface(geometry)
     mesh = shade_mesh(geometry, edge)
