@@ -250,5 +250,5 @@ def share(diffuse: Colour, specular: Colour, coat: float = 0.04) -> tuple[Colour
 
     The diffuse colour stays, as it is what one sees, but for what a coat of `coat` takes away.
     """
-    shine = colour([max(min(s, 1 - d), min(s, coat)) for d, s in zip(diffuse, specular, strict=True)])
-    return colour([min(d, 1 - s) for d, s in zip(diffuse, shine, strict=True)]), shine
+    shine = colour([max(s - max(d + s - 1, 0), min(s, coat)) for d, s in zip(diffuse, specular, strict=True)])
+    return colour([d - max(d + s - 1, 0) for d, s in zip(diffuse, shine, strict=True)]), shine

@@ -51,31 +51,34 @@ class PlainImporter:
 
 def _read(path: Path, data: bytes, kind: str, notes: Notes) -> tuple[Any, Any, Any, Any]:
     """Positions, faces, normals and uvs, in range but otherwise as the file has them."""
-    import trimesh
+    from trimesh.exchange.ply import load_ply
+    from trimesh.exchange.stl import load_stl
 
     try:
         with np.errstate(all="ignore"):
-            mesh = trimesh.load_mesh(io.BytesIO(data), file_type=kind, process=False, resolver=None)
-        positions = np.asarray(mesh.vertices, dtype=np.float64).reshape(-1, 3)
-        faces = np.asarray(getattr(mesh, "faces", ())).reshape(-1, 3)
+            found = load_ply(io.BytesIO(data)) if kind == "ply" else load_stl(io.BytesIO(data))
+        positions = np.asarray(found.get("vertices", ()), dtype=np.float64).reshape(-1, 3)
+        faces = found.get("faces")
+        faces = np.asarray(() if faces is None else faces).reshape(-1, 3)
+        inside = np.asarray(((faces >= 0) & (faces < len(positions))).all(axis=1))
+        faces = faces[inside].astype(np.int64)
     except Exception as error:  # the reader raises whatever a damaged file provokes
         raise refuse(path, f"it is damaged ({type(error).__name__})") from None
     if len(faces) > MOST_FACES:
         raise refuse(path, f"more than {MOST_FACES // 10**6} million faces are not accepted")
-    inside = np.asarray(((faces >= 0) & (faces < len(positions))).all(axis=1))
     notes.count("Faces left out because they name vertices that do not exist", int((~inside).sum()))
-    faces = faces[inside].astype(np.int64)
-    visual = mesh.visual
-    if getattr(visual, "kind", None) in ("vertex", "face"):
+    if any(found.get(colours) is not None for colours in ("vertex_colors", "face_colors")):
         notes.say("Colours of vertices and faces are not used.")
-    normals = None
-    if kind == "ply" and "vertex_normals" in mesh._cache.cache:
-        normals = np.asarray(mesh.vertex_normals, dtype=np.float64)
-    uvs = getattr(visual, "uv", None)
-    if uvs is not None:
-        uvs = np.asarray(uvs, dtype=np.float64)
-        uvs = uvs if uvs.shape == (len(positions), 2) else None
+    normals = _fitting(found.get("vertex_normals"), (len(positions), 3))
+    uvs = _fitting(getattr(found.get("visual"), "uv", None), (len(positions), 2))
     return positions, faces, normals, uvs
+
+
+def _fitting(values: Any, shape: tuple[int, int]) -> Any:
+    """Floats of that shape, or None."""
+    if values is None or np.shape(values) != shape:
+        return None
+    return np.asarray(values, dtype=np.float64)
 
 
 def _check_ply(path: Path, data: bytes) -> None:

@@ -1,0 +1,367 @@
+"""glTF: hierarchy, instances, baking, attributes, materials, and damaged files."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from gltf_writer import SQUARE, TRIANGLE, Writer, square
+
+from studio_core.contract import ImportedModel
+from studio_core.errors import InputError
+from studio_core.imaging.encode import encode_png
+from studio_core.scene.nodes import Group, MeshObject, Scene
+from studio_plugins.meshes.gltf import IMPORTER
+
+
+def load(folder: Path, data: bytes | Writer, unit: float = 1.0, name: str = "model.glb") -> ImportedModel:
+    path = folder / name
+    path.write_bytes(data.glb() if isinstance(data, Writer) else data)
+    return IMPORTER.load(path, unit)
+
+
+def world(model: ImportedModel, node: MeshObject) -> np.ndarray:
+    """World positions of an object."""
+    matrix = Scene().with_nodes(*model.nodes).world(node.id).matrix()
+    made: np.ndarray = node.geometry.positions.astype(float) @ matrix[:3, :3].T + matrix[:3, 3]
+    return made
+
+
+@pytest.mark.parametrize("text", [False, True])
+def test_a_single_mesh_is_one_object(tmp_path: Path, text: bool) -> None:
+    made = square()
+    model = load(tmp_path, made.gltf() if text else made.glb(), 0.01)
+    (node,) = model.nodes
+    assert isinstance(node, MeshObject)
+    assert node.name == "seat"
+    np.testing.assert_allclose(node.geometry.positions, SQUARE * 0.01, atol=1e-9)
+    assert node.geometry.faces.tolist() == [[0, 1, 2], [0, 2, 3]]
+    assert node.geometry.normals is None
+
+
+def test_external_buffers_are_read_from_beside_the_file(tmp_path: Path) -> None:
+    made = square()
+    whole = made.whole()
+    whole["buffers"][0]["uri"] = "Some%20data.bin"
+    (tmp_path / "some data.bin").write_bytes(bytes(made.data))
+    assert load(tmp_path, json.dumps(whole).encode(), name="model.gltf").objects
+    whole["buffers"][0]["uri"] = "absent.bin"
+    with pytest.raises(InputError, match=r"model\.gltf.*absent\.bin.*missing"):
+        load(tmp_path, json.dumps(whole).encode(), name="model.gltf")
+
+
+@pytest.mark.parametrize(("mode", "faces"), [(4, 1), (5, 4), (6, 4)])
+def test_triangles_strips_and_fans(tmp_path: Path, mode: int, faces: int) -> None:
+    """A fan and a strip over the same flat hexagon or band have one orientation and no overlap."""
+    made = Writer()
+    if mode == 6:
+        angles = np.arange(6) / 6 * 2 * np.pi
+        points = np.stack([np.cos(angles), np.sin(angles), 0 * angles], axis=1)
+        area = 6 * math.sqrt(3) / 4
+    else:
+        points = np.array([[i // 2, i % 2, 0] for i in (1, 0, 3, 2, 5, 4)])
+        area = 2.0
+    count = 3 if mode == 4 else 6
+    position = made.accessor(points[:count].astype(np.float32))
+    made.json |= {
+        "meshes": [{"primitives": [{"attributes": {"POSITION": position}, "mode": mode}]}],
+        "nodes": [{"mesh": 0}],
+    }
+    geometry = load(tmp_path, made).objects[0].geometry
+    a, b, c = (geometry.positions[geometry.faces[:, i]] for i in range(3))
+    across = np.cross(b - a, c - a)[:, 2] / 2
+    assert len(across) == faces
+    assert (across > 0).all()
+    if mode != 4:
+        assert across.sum() == pytest.approx(area, rel=1e-5)
+
+
+def test_hierarchy_stays_and_instances_share_their_geometry(tmp_path: Path) -> None:
+    made = square()
+    half = math.sqrt(0.5)
+    made.json["nodes"] = [
+        {"name": "table", "translation": [1, 2, 3], "children": [1, 2, 4]},
+        {"name": "left", "mesh": 0, "rotation": [0, 0, half, half], "scale": [2, 2, 2]},
+        {"name": "right", "children": [3], "translation": [5, 0, 0]},
+        {"name": "far", "mesh": 0},
+        {"name": "empty", "children": []},
+    ]
+    model = load(tmp_path, made, 0.5)
+    names = {node.name: node for node in model.nodes}
+    assert set(names) == {"table", "left", "right", "far"}  # what holds no mesh is left out
+    assert isinstance(model.nodes[0], Group)
+    assert names["far"].parent == names["right"].id
+    left, far = names["left"], names["far"]
+    assert isinstance(left, MeshObject)
+    assert isinstance(far, MeshObject)
+    assert left.geometry is far.geometry
+    turned = SQUARE[:, [1, 0, 2]] * [-1, 1, 1]
+    np.testing.assert_allclose(world(model, left), 0.5 * (2 * turned + [1, 2, 3]), atol=1e-6)
+    np.testing.assert_allclose(world(model, far), 0.5 * (SQUARE + np.array([6, 2, 3])), atol=1e-6)
+
+
+def random_matrix(rng: np.random.Generator, mirrored: bool) -> np.ndarray:
+    while True:
+        made = np.eye(4)
+        made[:3] = rng.normal(size=(3, 4))
+        if abs(np.linalg.det(made)) > 0.2 and (np.linalg.det(made) < 0) == mirrored:
+            return made
+
+
+@pytest.mark.parametrize("mirrored", [False, True])
+@pytest.mark.parametrize("seed", range(4))
+def test_shear_and_mirroring_are_baked_down_the_hierarchy(tmp_path: Path, mirrored: bool, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    made = square()
+    normal = made.accessor(np.tile(np.array([[0, 0, 1]], np.float32), (4, 1)))
+    made.json["meshes"][0]["primitives"][0]["attributes"]["NORMAL"] = normal
+    outer, inner = random_matrix(rng, mirrored), random_matrix(rng, False)
+    made.json["nodes"] = [
+        {"matrix": outer.T.ravel().tolist(), "children": [1, 2]},
+        {"matrix": inner.T.ravel().tolist(), "mesh": 0},
+        {"mesh": 0},
+    ]
+    model = load(tmp_path, made)
+    homogeneous = np.concatenate([SQUARE, np.ones((4, 1))], axis=1)
+    for node, matrix in zip(model.objects, (outer @ inner, outer), strict=True):
+        expected = (homogeneous @ matrix.T)[:, :3]
+        np.testing.assert_allclose(world(model, node), expected, atol=1e-5)
+        a, b, c = (world(model, node)[node.geometry.faces[:, i]] for i in range(3))
+        flat = np.cross(b - a, c - a)[0]
+        flat /= np.linalg.norm(flat)
+        outward = np.linalg.inv(matrix[:3, :3]).T @ [0, 0, 1]
+        outward /= np.linalg.norm(outward)
+        turn = Scene().with_nodes(*model.nodes).world(node.id).matrix()[:3, :3]
+        assert node.geometry.normals is not None
+        shown = node.geometry.normals[0] @ turn.T
+        np.testing.assert_allclose(shown / np.linalg.norm(shown), outward, atol=1e-4)
+        np.testing.assert_allclose(flat, outward, atol=1e-4)
+
+
+def test_attributes_normalised_integers_sparse_values_and_uv_sets(tmp_path: Path) -> None:
+    made = Writer()
+    position = made.accessor(SQUARE)
+    indices = made.view(np.array([3], np.uint8).tobytes())
+    values = made.view(np.array([[0, 4, 0]], np.float32).tobytes())
+    made.json["accessors"][position]["sparse"] = {
+        "count": 1,
+        "indices": {"bufferView": indices, "componentType": 5121},
+        "values": {"bufferView": values},
+    }
+    unused = made.accessor(np.zeros((4, 2), np.float32))
+    uv = made.accessor(np.array([[0, 0], [255, 0], [255, 255], [0, 51]], np.uint8), normalized=True)
+    picture = made.view(encode_png(np.full((2, 2, 3), 128, np.uint8)))
+    made.json |= {
+        "meshes": [
+            {
+                "primitives": [
+                    {
+                        "attributes": {"POSITION": position, "TEXCOORD_0": unused, "TEXCOORD_1": uv},
+                        "mode": 6,
+                        "material": 0,
+                    }
+                ]
+            }
+        ],
+        "nodes": [{"mesh": 0}],
+        "images": [{"bufferView": picture, "mimeType": "image/png"}],
+        "textures": [{"source": 0}],
+        "materials": [
+            {
+                "pbrMetallicRoughness": {
+                    "baseColorTexture": {
+                        "index": 0,
+                        "texCoord": 1,
+                        "extensions": {"KHR_texture_transform": {"scale": [2, 4], "offset": [0.5, 0.25]}},
+                    }
+                }
+            }
+        ],
+    }
+    model = load(tmp_path, made)
+    geometry = model.objects[0].geometry
+    assert [0, 4, 0] in geometry.positions.tolist()
+    assert geometry.uvs is not None
+    corner = geometry.positions.tolist().index([0, 4, 0])
+    np.testing.assert_allclose(geometry.uvs[corner], [0, 0.8], atol=1e-6)
+    texture = model.materials[0].textures["base_color"]
+    # the format's v runs down: (0, 0.2) ↦ (0.5, 0.25 + 4 · 0.2 = 1.05) from the top
+    placed = geometry.uvs[corner] * texture.scale + texture.offset
+    np.testing.assert_allclose([placed[0], 1 - placed[1]], [0.5, 1.05], atol=1e-5)
+
+
+def with_material(folder: Path, **material: Any) -> tuple[Any, ImportedModel]:
+    made = square(material=0)
+    made.json["materials"] = [{"name": "m", **material}]
+    model = load(folder, made)
+    return model.materials[0], model
+
+
+def test_materials_keep_their_exact_numbers(tmp_path: Path) -> None:
+    made, _ = with_material(
+        tmp_path,
+        pbrMetallicRoughness={"baseColorFactor": [0.00123, 0.5, 0.9, 1], "metallicFactor": 0.25},
+    )
+    assert made.model == "ggx"
+    assert made.values["base_color"] == pytest.approx((0.00123, 0.5, 0.9))
+    assert (made.values["metallic"], made.values["roughness"]) == (0.25, 1.0)
+    assert made.values["specular"] == pytest.approx(0.5)
+    assert made.opacity == 1
+
+
+def test_transparency(tmp_path: Path) -> None:
+    pbr = {"baseColorFactor": [1, 1, 1, 0.3]}
+    assert with_material(tmp_path, pbrMetallicRoughness=pbr)[0].opacity == 1
+    assert with_material(tmp_path, pbrMetallicRoughness=pbr, alphaMode="BLEND")[0].opacity == 0.3
+    assert with_material(tmp_path, pbrMetallicRoughness=pbr, alphaMode="MASK")[0].opacity == 0
+    glass = {"KHR_materials_transmission": {"transmissionFactor": 0.9}}
+    assert with_material(tmp_path, extensions=glass)[0].opacity == pytest.approx(0.1)
+    diamond = {"KHR_materials_ior": {"ior": 2.4}}
+    assert with_material(tmp_path, extensions=diamond)[0].values["specular"] == 1.0
+
+
+def test_the_mean_of_a_metallic_roughness_picture_is_used(tmp_path: Path) -> None:
+    made = square(material=0)
+    pixels = np.zeros((2, 2, 3), np.uint8)
+    pixels[:, :, 1], pixels[0, :, 2] = 51, 255
+    made.json |= {
+        "images": [{"bufferView": made.view(encode_png(pixels))}],
+        "textures": [{"source": 0}],
+        "materials": [{"pbrMetallicRoughness": {"metallicRoughnessTexture": {"index": 0}}}],
+    }
+    model = load(tmp_path, made)
+    assert model.materials[0].values["metallic"] == pytest.approx(0.5)
+    assert model.materials[0].values["roughness"] == pytest.approx(0.2)
+    assert any("mean" in note for note in model.notes)
+
+
+def test_a_damaged_picture_is_a_note(tmp_path: Path) -> None:
+    made = square(material=0)
+    made.json |= {
+        "images": [{"bufferView": made.view(b"\x89PNG\r\n\x1a\n no")}],
+        "textures": [{"source": 0}],
+        "materials": [{"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}],
+    }
+    model = load(tmp_path, made)
+    assert model.materials[0].textures == {}
+    assert any("image 0" in note for note in model.notes)
+
+
+def test_primitives_of_one_material_share_a_slot(tmp_path: Path) -> None:
+    made = square(material=0)
+    position = made.accessor(TRIANGLE + np.float32(5))
+    primitives = made.json["meshes"][0]["primitives"]
+    primitives.append({"attributes": {"POSITION": position}, "material": 1})
+    primitives.append({"attributes": {"POSITION": made.accessor(TRIANGLE + np.float32(9))}, "material": 0})
+    made.json["materials"] = [{"name": "a"}, {"name": "b"}, {"name": "unused"}]
+    model = load(tmp_path, made)
+    (node,) = model.objects
+    assert [m.name for m in model.materials] == ["a", "b"]
+    assert len(node.materials) == 2
+    assert node.geometry.slots is not None
+    assert node.geometry.slots.tolist() == [0, 0, 1, 0]
+
+
+def damaged() -> dict[str, dict[str, Any]]:
+    """What is put over the JSON of a good file."""
+    ok = {"bufferView": 0, "componentType": 5126, "count": 4, "type": "VEC3"}
+    indices = {"bufferView": 1, "componentType": 5123, "count": 6, "type": "SCALAR"}
+    cycle: list[dict[str, Any]] = [{"children": [1]}, {"children": [0], "mesh": 0}]
+    return {
+        "version": {"asset": {"version": "1.0"}},
+        "no asset": {"asset": 7},
+        "a cycle": {"nodes": cycle},
+        "itself": {"nodes": [{"children": [0], "mesh": 0}]},
+        "two parents": {
+            "nodes": [{"children": [2]}, {"children": [2]}, {"mesh": 0}],
+            "scenes": [{"nodes": [0, 1]}],
+        },
+        "deep": {"nodes": [{"children": [i + 1]} for i in range(3000)] + [{"mesh": 0}]},
+        "no node": {"scenes": [{"nodes": [9]}]},
+        "no scene": {"scene": 3},
+        "no mesh": {"nodes": [{"mesh": 4}]},
+        "a true mesh": {"nodes": [{"mesh": True}]},
+        "rotation 0": {"nodes": [{"mesh": 0, "rotation": [0, 0, 0, 0]}]},
+        "huge": {"nodes": [{"mesh": 0, "scale": [1e300, 1, 1]}]},
+        "collapsed": {"nodes": [{"mesh": 0, "scale": [0, 0, 0]}]},
+        "a text": {"nodes": [{"mesh": 0, "translation": "far"}]},
+        "long accessor": {"accessors": [{**ok, "count": 10**12}, indices]},
+        "a bit long": {"accessors": [{**ok, "count": 5}, indices]},
+        "negative": {"accessors": [{**ok, "count": -1}, indices]},
+        "offset": {"accessors": [{**ok, "byteOffset": 10**9}, indices]},
+        "no data": {"accessors": [{**ok, "bufferView": None}, indices]},
+        "bomb": {"accessors": [{"componentType": 5126, "count": 10**11, "type": "VEC3"}, indices]},
+        "type": {"accessors": [{**ok, "type": "VEC2"}, indices]},
+        "component": {"accessors": [{**ok, "componentType": 1}, indices]},
+        "float indices": {"accessors": [ok, {**indices, "componentType": 5126, "count": 3}]},
+        "outside": {"accessors": [{**ok, "count": 3}, indices]},
+        "view": {"bufferViews": [{"buffer": 0, "byteLength": 10**9}]},
+        "buffer": {"bufferViews": [{"buffer": 7, "byteLength": 9}]},
+        "no primitives": {"meshes": [{}]},
+        "mode": {"meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "mode": 99}]}]},
+        "lines": {"meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "mode": 1}]}]},
+        "material": {"meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "material": 1}]}]},
+        "draco": {"extensionsRequired": ["KHR_draco_mesh_compression"]},
+        "lists": {"meshes": {}, "nodes": 3},
+    }
+
+
+@pytest.mark.parametrize("which", damaged())
+def test_damaged_files_are_refused_in_one_sentence(tmp_path: Path, which: str) -> None:
+    made = square()
+    made.json |= damaged()[which]
+    with pytest.raises(InputError, match=r"model\.glb cannot be imported") as caught:
+        load(tmp_path, made)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        b"glTF",
+        b"glTF" + bytes(40),
+        b"[" * 100_000,
+        b"null",
+        b'{"asset": {"version": "2.0"}, "x": NaN}',
+        b'{"asset": {"version": "2.0"}, "x": ' + b"9" * 5000 + b"}",
+        "not even UTF-8 é".encode("utf-16"),
+    ],
+)
+def test_what_is_no_gltf_is_refused(tmp_path: Path, data: bytes) -> None:
+    with pytest.raises(InputError, match=r"model\.glb"):
+        load(tmp_path, data)
+
+
+def test_a_bad_optional_attribute_is_left_out_with_a_note(tmp_path: Path) -> None:
+    made = square()
+    short = made.accessor(np.zeros((2, 3), np.float32))
+    made.json["meshes"][0]["primitives"][0]["attributes"] |= {"NORMAL": short, "TEXCOORD_0": 99}
+    model = load(tmp_path, made)
+    assert model.objects[0].geometry.normals is None
+    assert model.objects[0].geometry.uvs is None
+    told = " ".join(model.notes)
+    assert "NORMAL" in told
+    assert "TEXCOORD_0" in told
+
+
+def test_meshes_that_no_node_places_are_taken_with_a_note(tmp_path: Path) -> None:
+    made = square()
+    for key in ("nodes", "scenes", "scene"):
+        del made.json[key]
+    model = load(tmp_path, made)
+    assert len(model.objects) == 1
+    assert any("origin" in note for note in model.notes)
+
+
+def test_a_file_of_trimesh_comes_back(tmp_path: Path) -> None:
+    import trimesh
+
+    box = trimesh.creation.box((1, 2, 3))
+    trimesh.Scene([box]).export(tmp_path / "box.glb")
+    geometry = IMPORTER.load(tmp_path / "box.glb").objects[0].geometry
+    np.testing.assert_allclose(geometry.bounds, box.bounds, atol=1e-6)
+    assert len(geometry.faces) == 12
