@@ -293,13 +293,17 @@ def test_a_gesture_is_one_step_from_the_press() -> None:
     told: list[Aspect] = []
     document.changed.connect(lambda before, after, changes: told.append(changes.aspects))
     with document.gesture("Drag") as gesture:
-        for x in (1.0, 2.0, 3.0):
+        for x in (1.0, 2.0):
             gesture.apply(move(x))
+        gesture.apply(edits.Add((Group(id="ghost"),)))
+        gesture.apply(move(3.0))
         gesture.add(edits.SetFields("cube", {"name": "Moved"}))
     assert [step.label for step in document.history] == ["Open", "Drag"]
     assert document.scene["cube"].transform.translation[0] == 3.0
     assert document.scene["cube"].name == "Moved"
-    assert told == [Aspect.TRANSFORM] * 3 + [Aspect.NAME]
+    assert "ghost" not in document.scene.nodes
+    both = Aspect.TRANSFORM | Aspect.STRUCTURE
+    assert told == [Aspect.TRANSFORM, Aspect.TRANSFORM, both, both, Aspect.NAME]
     document.undo()
     assert told[-1] == Aspect.TRANSFORM | Aspect.NAME
 
