@@ -1,0 +1,1 @@
+"""The window: panels, canvas, and how they reach document and session."""

@@ -1,0 +1,1 @@
+"""The picture and everything done with the mouse in it."""

@@ -1,0 +1,1 @@
+"""Dockable panels. They read the scene and write edits; none knows another."""

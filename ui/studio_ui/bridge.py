@@ -1,0 +1,42 @@
+"""From any thread to the window's: the only QObject that two threads know."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+
+from PySide6.QtCore import QObject, Qt, Signal
+
+
+class Bridge(QObject):
+    """Queues calls on the thread that made it. Safe while the window goes: late calls are dropped."""
+
+    _called = Signal(object)
+
+    def __init__(self, on_error: Callable[[Exception], None] | None = None) -> None:
+        super().__init__()
+        self.on_error = on_error
+        self._guard = threading.Lock()
+        self._open = True
+        self._called.connect(self._run, Qt.ConnectionType.QueuedConnection)
+
+    def post(self, call: Callable[[], object]) -> None:
+        """Run `call` on the window's thread soon, in the order of posting."""
+        with self._guard:
+            if self._open:
+                self._called.emit(call)
+
+    def close(self) -> None:
+        """Drop what is queued and what is still to come."""
+        with self._guard:
+            self._open = False
+
+    def _run(self, call: Callable[[], object]) -> None:
+        if not self._open:
+            return
+        try:
+            call()
+        except Exception as error:
+            if self.on_error is None:
+                raise
+            self.on_error(error)

@@ -1,0 +1,101 @@
+"""What the window needs of a canvas, whatever draws it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Literal, Protocol
+
+import numpy as np
+import numpy.typing as npt
+from PySide6.QtGui import QImage
+from PySide6.QtWidgets import QWidget
+
+from studio_core.scene.nodes import NodeId
+from studio_core.session import View
+from studio_core.shading.artifacts import Picture
+from studio_core.signal import Signal
+from studio_ui.canvas.glyphs import Glyph
+from studio_ui.feed import Freshness
+from studio_ui.theme import Theme
+
+Button = Literal["left", "middle", "right", "none"]
+
+
+@dataclass(frozen=True)
+class Pointer:
+    """A mouse event: (x, y) in 0…1 from the top left of the canvas, `button` what was pressed or is held.
+
+    `pixels` are the canvas' logical width and height, for thresholds that are felt by the hand.
+    """
+
+    kind: Literal["press", "move", "release", "double"]
+    x: float
+    y: float
+    button: Button = "none"
+    shift: bool = False
+    ctrl: bool = False
+    alt: bool = False
+    pixels: tuple[int, int] = (1, 1)
+
+
+@dataclass(frozen=True)
+class Probe:
+    """What lies under a point of the canvas: node (None: nothing), metres along the ray, linear radiance."""
+
+    node: NodeId | None
+    distance: float
+    radiance: tuple[float, float, float]
+
+
+class Viewport(Protocol):
+    """Shows pictures and reports what the hand does. `resized` gives device pixels."""
+
+    widget: QWidget
+    pointer: Signal[[Pointer]]
+    wheel: Signal[[Pointer, float]]
+    key: Signal[[str, bool]]
+    left: Signal[[]]
+    resized: Signal[[int, int]]
+
+    def set_picture(self, picture: Picture | None, view: View | None) -> None:
+        """Another picture, and the view it was made for."""
+        ...
+
+    def set_freshness(self, state: Freshness) -> None:
+        """Mark the picture."""
+        ...
+
+    def set_display(self, exposure: float, tonemap: str) -> None:
+        """Exposure in EV and the view transform; nothing is shaded."""
+        ...
+
+    def set_selection(self, nodes: Iterable[NodeId]) -> None:
+        """Meshes to be outlined (and glyphs to be lit)."""
+        ...
+
+    def set_guides(
+        self, view: View, glyphs: Iterable[Glyph], boxes: npt.NDArray[np.float64] | None = None
+    ) -> None:
+        """Lines over the picture as the present view sees them; `boxes` (N, 2, 3) follow a gesture."""
+        ...
+
+    def set_message(self, text: str) -> None:
+        """A line over an empty canvas."""
+        ...
+
+    def set_theme(self, theme: Theme) -> None:
+        """Colours around and over the picture."""
+        ...
+
+    def probe(self, x: float, y: float) -> Probe | None:
+        """What the shown picture has at a point of the canvas; None outside or without a picture."""
+        ...
+
+    def glyph_at(self, x: float, y: float) -> NodeId | None:
+        """The lamp or camera drawn near a point of the canvas."""
+        ...
+
+    def grab_image(self) -> QImage:
+        """The canvas as it is seen."""
+        ...

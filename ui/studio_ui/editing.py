@@ -1,0 +1,97 @@
+"""The window's way to the document: edits, gestures that span events, errors told instead of raised."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from studio_core.document import Document, Gesture
+from studio_core.edits import Edit
+from studio_core.errors import LucarneError
+from studio_core.signal import Signal
+
+
+class Editing:
+    """Panels and tools write through this. One gesture at a time; whoever began it ends it."""
+
+    def __init__(self, document: Document, refuse: Callable[[str, BaseException], object]) -> None:
+        self.document = document
+        self.began: Signal[[]] = Signal()  # a gesture started: pictures should come quickly
+        self.settled: Signal[[]] = Signal()  # it ended: they may take their time again
+        self._refuse = refuse
+        self._gesture: Gesture | None = None
+        self._owner: object = None
+
+    @property
+    def busy(self) -> bool:
+        """Whether a gesture is under way."""
+        return self._gesture is not None
+
+    def apply(self, edit: Edit) -> bool:
+        """Do an edit as one step (a gesture under way is ended first); False when it was refused."""
+        self.finish()
+        return self._try(edit.label, lambda: self.document.apply(edit))
+
+    def begin(self, owner: object, label: str) -> bool:
+        """Start a gesture; False while another one is under way."""
+        if self._gesture is not None:
+            return False
+        self._gesture, self._owner = self.document.begin(label), owner
+        self.began.emit()
+        return True
+
+    def preview(self, owner: object, edit: Edit) -> bool:
+        """Show the scene as at the gesture's start, changed by `edit`."""
+        gesture = self._gesture
+        if gesture is None or self._owner is not owner:
+            return False
+        return self._try(gesture.label, lambda: gesture.apply(edit))
+
+    def commit(self, owner: object) -> None:
+        """End the gesture as one step."""
+        if self._gesture is not None and self._owner is owner:
+            self._end(self.document.commit)
+
+    def cancel(self, owner: object) -> None:
+        """Roll the gesture back."""
+        if self._gesture is not None and self._owner is owner:
+            self._end(self.document.cancel)
+
+    def finish(self) -> None:
+        """Commit whatever gesture is under way."""
+        if self._gesture is not None:
+            self._end(self.document.commit)
+
+    def cancel_any(self) -> bool:
+        """Roll back whatever gesture is under way (Esc); whether there was one."""
+        if self._gesture is None:
+            return False
+        self._end(self.document.cancel)
+        return True
+
+    def undo(self) -> None:
+        """One step back."""
+        self.finish()
+        self.document.undo()
+
+    def redo(self) -> None:
+        """One step forward."""
+        self.finish()
+        self.document.redo()
+
+    def go_to(self, position: int) -> None:
+        """Show any step of the history."""
+        self.finish()
+        self.document.go_to(position)
+
+    def _end(self, how: Callable[[], None]) -> None:
+        self._gesture = self._owner = None
+        how()
+        self.settled.emit()
+
+    def _try(self, label: str, action: Callable[[], object]) -> bool:
+        try:
+            action()
+        except (LucarneError, ValueError) as error:
+            self._refuse(label, error)
+            return False
+        return True

@@ -1,0 +1,291 @@
+"""From changes of document and session to pictures: what to ask the scheduler for, and how finely.
+
+While somebody drags or looks around, pictures are small and unsmoothed and a new one is asked for as soon as
+the last one was seen; at rest one full, smoothed picture follows. No Qt here.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from enum import Enum
+from typing import Any, Protocol
+
+from studio_core.document import Document
+from studio_core.scene.diff import Aspect, Changes, everything, view_changed
+from studio_core.scene.nodes import Scene
+from studio_core.session import Session, View
+from studio_core.shading.artifacts import Picture
+from studio_core.shading.frame import Frame
+from studio_core.shading.job import Job
+from studio_core.shading.pipeline import Pipeline
+from studio_core.shading.scheduler import Executor, Scheduler
+from studio_core.signal import Signal
+
+REST_MS = 260
+REST_PIXELS, REST_SAMPLES = 2_400_000, 4_500_000
+MOVING_PIXELS = 260_000
+
+
+class Freshness(Enum):
+    """How the picture on the screen stands to the scene."""
+
+    NONE = "no picture yet"
+    STALE = "updating"
+    REFINING = "refining"
+    CURRENT = "up to date"
+    FAILED = "not up to date"
+
+
+@dataclass(frozen=True)
+class Shown:
+    """What the status bar tells of a picture: seconds from the request to the picture."""
+
+    picture: Picture
+    view: View
+    final: bool
+    seconds: float
+
+
+class Shading(Protocol):
+    """What the composition root provides: pipelines and their parameters by backend.
+
+    Both are called on the compute thread alone, since they import what is heavy.
+    """
+
+    def pipeline(self, backend: str) -> Pipeline:
+        """Fresh stages that end in a Picture."""
+        ...
+
+    def params(self, backend: str, values: Mapping[str, Any]) -> Any:
+        """The backend's parameters."""
+        ...
+
+
+class LazyPipeline:
+    """A pipeline that is made when the compute thread first needs it."""
+
+    def __init__(self, shading: Shading, backend: str) -> None:
+        self._shading, self._backend = shading, backend
+        self._made: Pipeline | None = None
+        self._error: Exception | None = None
+
+    @property
+    def current(self) -> int:
+        """Index of the stage that runs."""
+        return self._made.current if self._made is not None else 0
+
+    def dirties(self, changes: Changes, upto: int) -> bool:
+        """Whether a stage at or before index `upto` would rerun."""
+        return self._made.dirties(changes, upto) if self._made is not None else bool(changes)
+
+    def mark(self, frame: Frame, changes: Changes) -> None:
+        """Remember what changed; a pipeline that was not made yet starts with everything anyway."""
+        if self._made is not None:
+            self._made.mark(frame, changes)
+
+    def update(self, frame: Frame, changes: Changes, job: Job) -> Any:
+        """See `Pipeline.update`; raises again what making it raised."""
+        if self._error is not None:
+            raise self._error
+        if self._made is None:
+            try:
+                self._made = self._shading.pipeline(self._backend)
+            except Exception as error:
+                self._error = error
+                raise
+        params = self._shading.params(self._backend, frame.params)
+        return self._made.update(dataclasses.replace(frame, params=params), changes, job)
+
+
+class PictureFeed:
+    """`shown`, `freshness`, `failed` and `progress` are emitted on the window's thread."""
+
+    def __init__(
+        self,
+        document: Document,
+        session: Session,
+        shading: Shading,
+        executor: Executor,
+        post: Callable[[Callable[[], None]], None],
+        later: Callable[[int, Callable[[], None]], object],
+    ) -> None:
+        self.shown: Signal[[Shown]] = Signal()
+        self.freshness: Signal[[Freshness]] = Signal()
+        self.failed: Signal[[Exception]] = Signal()
+        self.progress: Signal[[Job]] = Signal()
+        self.state = Freshness.NONE
+        self.last: Shown | None = None
+        self.size = (session.view.width, session.view.height)
+        self._document, self._session, self._shading = document, session, shading
+        self._executor, self._post, self._later = executor, post, later
+        self._moving = 0  # gestures under way
+        self._until = 0.0  # single steps (wheel, keys) count as moving until then
+        self._changes = Changes()
+        self._queued = self._closed = False
+        self._answered = self._finer_only = True
+        self._revision = 0
+        self._outdated = 0  # pictures of revisions before this one are stale
+        self._asked: dict[int, float] = {}
+        self._backend = session.backend
+        self._scheduler = self._schedule()
+        self._off = [document.changed.connect(self._edited), session.changed.connect(self._looked)]
+
+    @property
+    def busy(self) -> bool:
+        """Whether a picture is being made or waits to be asked for."""
+        return self._scheduler.busy or self._queued or bool(self._changes)
+
+    @property
+    def job(self) -> Job | None:
+        """What runs now."""
+        return self._scheduler.job
+
+    @property
+    def moving(self) -> bool:
+        """Whether somebody drags or looks around."""
+        return self._moving > 0 or time.monotonic() < self._until
+
+    def resized(self, width: int, height: int) -> None:
+        """The canvas has other pixels."""
+        if (width, height) != self.size and width > 0 and height > 0:
+            self.size = (width, height)
+            self._session.view = self._session.view.sized(width, height)
+            self.step()
+            self.want(view_changed())
+
+    def hold(self) -> None:
+        """A drag starts; `release` ends it."""
+        self._moving += 1
+
+    def release(self) -> None:
+        """A drag has ended: a full picture follows."""
+        self._moving = max(0, self._moving - 1)
+        self._later(REST_MS, self._rest)
+
+    def step(self) -> None:
+        """A single step of looking around (wheel, key, resize)."""
+        self._until = time.monotonic() + REST_MS / 1000
+        self._later(REST_MS + 20, self._rest)
+
+    def restart(self) -> None:
+        """Ask for everything again."""
+        self.want(everything(self._document.scene))
+
+    def cancel(self) -> None:
+        """Stop and keep what is shown."""
+        self._changes = Changes()
+        self._scheduler.cancel()
+        self._tell(Freshness.FAILED if self.state is Freshness.STALE else self.state)
+
+    def want(self, changes: Changes, *, finer: bool = False) -> None:
+        """Something changed (or the same picture is wanted `finer`): ask soon, once for all until then."""
+        if self._closed:
+            return
+        self._changes |= changes
+        self._finer_only = finer and self._finer_only
+        gentle = finer and self.state in (Freshness.CURRENT, Freshness.REFINING)
+        self._tell(Freshness.REFINING if gentle else Freshness.STALE)
+        if not self._queued:
+            self._queued = True
+            self._later(0, self._flush)
+
+    def frame_view(self) -> View:
+        """The session's view in the pixels and samples that are right just now."""
+        width, height = self.size
+        limit = MOVING_PIXELS if self.moving else REST_PIXELS
+        shrink = min(1.0, (limit / (width * height)) ** 0.5)
+        view = self._session.view.sized(round(width * shrink), round(height * shrink))
+        smooth = not self.moving and view.width * view.height * 4 <= REST_SAMPLES
+        return dataclasses.replace(view, antialias=2 if smooth else 1)
+
+    def close(self) -> None:
+        """Stop listening, cancel, show nothing more."""
+        self._closed = True
+        for off in self._off:
+            off()
+        self._scheduler.close()
+
+    def _schedule(self) -> Scheduler:
+        pipeline: Any = LazyPipeline(self._shading, self._backend)
+        scheduler = Scheduler(pipeline, self._executor, self._post)
+        scheduler.shown.connect(self._show)
+        scheduler.failed.connect(self._fail)
+        scheduler.progress.connect(self.progress.emit)
+        scheduler.idle.connect(self._idle)
+        return scheduler
+
+    def _edited(self, before: Scene, after: Scene, changes: Changes) -> None:
+        if changes.aspects & ~Aspect.NAME:
+            self.want(changes)
+
+    def _looked(self, aspect: Aspect) -> None:
+        if self._session.backend != self._backend:
+            self._scheduler.close()
+            self._backend = self._session.backend
+            self._answered, self._asked, self._outdated = True, {}, 0
+            self._revision = 0
+            self._scheduler = self._schedule()
+            self.restart()
+        self.want(view_changed(aspect))
+
+    def _flush(self) -> None:
+        self._queued = False
+        if self._closed or not self._changes:
+            return
+        if self.moving and self._scheduler.busy and not self._answered:
+            return  # let one picture be seen before asking for the next
+        changes, self._changes = self._changes, Changes()
+        self._answered = False
+        frame = Frame(self._document.scene, self.frame_view(), self._session.params)
+        asked, finer_only, self._finer_only = time.monotonic(), self._finer_only, True
+        revision = self._revision = self._revision + 1  # as the scheduler counts
+        self._asked[revision] = asked
+        self._outdated = self._outdated if finer_only else revision
+        self._scheduler.request(frame, changes)
+
+    def _rest(self) -> None:
+        if self._closed or self.moving:
+            return
+        shown = self.last.view if self.last is not None else None
+        wanted = self.frame_view()
+        coarse = shown is None or (shown.width, shown.antialias) != (wanted.width, wanted.antialias)
+        if coarse or self._changes:
+            self.want(view_changed(), finer=True)
+
+    def _show(self, frame: Frame, picture: Picture, final: bool) -> None:
+        self._answered = True
+        asked = self._asked.get(frame.revision, time.monotonic())
+        self._asked = {r: t for r, t in self._asked.items() if r >= frame.revision}
+        self.last = Shown(picture, frame.view, final, time.monotonic() - asked)
+        self.shown.emit(self.last)
+        if frame.revision < self._outdated or (self._changes and not self._finer_only):
+            self._tell(Freshness.STALE)
+        else:
+            waits = self._changes or any(r > frame.revision for r in self._asked)
+            self._tell(Freshness.REFINING if waits or not final else Freshness.CURRENT)
+        self._again()
+
+    def _fail(self, frame: Frame, error: Exception) -> None:
+        self._answered = True
+        self._tell(Freshness.FAILED)
+        self.failed.emit(error)
+        self._again()
+
+    def _idle(self) -> None:
+        self._answered = True
+        self._again()
+
+    def _again(self) -> None:
+        if self._changes and not self._queued and not self._closed:
+            self._queued = True
+            self._later(0, self._flush)
+
+    def _tell(self, state: Freshness) -> None:
+        if state is Freshness.STALE and self.last is None:
+            state = Freshness.NONE
+        if state is not self.state:
+            self.state = state
+            self.freshness.emit(state)

@@ -1,0 +1,274 @@
+"""The controls of one parameter each: number, flag, choice, text, colour."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from PySide6.QtCore import QSignalBlocker, Qt
+from PySide6.QtGui import QWheelEvent
+from PySide6.QtWidgets import (
+    QAbstractSpinBox,
+    QCheckBox,
+    QComboBox,
+    QDoubleSpinBox,
+    QHBoxLayout,
+    QLineEdit,
+    QSizePolicy,
+    QSlider,
+    QWidget,
+)
+
+from studio_core.params import ParamInfo
+from studio_ui.colour_button import ColourButton
+from studio_ui.sinks import Sink
+from studio_ui.theme import GAP
+
+_STEPS = 1000
+_WIDEST = 1e9
+
+
+class Spin(QDoubleSpinBox):
+    """A number field that leaves the wheel to the panel until it is clicked."""
+
+    def __init__(self, info: ParamInfo | None = None, *, decimals: int = 3) -> None:
+        super().__init__()
+        info = info or ParamInfo("number", "")
+        whole = info.kind == "integer"
+        self.setDecimals(0 if whole else decimals)
+        self.setRange(max(info.low, -_WIDEST), min(info.high, _WIDEST))
+        self.setSuffix(f" {info.unit}" if info.unit else "")
+        self.setKeyboardTracking(False)
+        self.setButtonSymbols(QAbstractSpinBox.ButtonSymbols.NoButtons)
+        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        self.setAlignment(Qt.AlignmentFlag.AlignRight)
+        self.setStepType(
+            QAbstractSpinBox.StepType.AdaptiveDecimalStepType
+            if info.scale == "log" or whole
+            else QAbstractSpinBox.StepType.DefaultStepType
+        )
+        self.setSingleStep(1 if info.unit == "°" or whole else 0.01)
+        self.setMinimumWidth(58)
+
+    def textFromValue(self, value: float) -> str:
+        """Without trailing zeros."""
+        text = f"{value:.{self.decimals()}f}"
+        return text.rstrip("0").rstrip(".") if "." in text else text
+
+    def wheelEvent(self, event: QWheelEvent) -> None:
+        """Only while it has the focus."""
+        if self.hasFocus():
+            super().wheelEvent(event)
+        else:
+            event.ignore()
+
+
+class Combo(QComboBox):
+    """A choice that leaves the wheel to the panel."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.setSizeAdjustPolicy(QComboBox.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon)
+        self.setMinimumContentsLength(8)
+        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
+
+    def wheelEvent(self, event: QWheelEvent) -> None:
+        """Never turns the choice by accident."""
+        event.ignore()
+
+
+class Slider(QSlider):
+    """A slider that leaves the wheel to the panel."""
+
+    def wheelEvent(self, event: QWheelEvent) -> None:
+        """Ignored."""
+        event.ignore()
+
+
+class Field(QWidget):
+    """One parameter's controls."""
+
+    def __init__(self, name: str, info: ParamInfo, sink: Sink) -> None:
+        super().__init__()
+        self.name, self.info, self.sink = name, info, sink
+        self.setToolTip(tip(info))
+        self.row = QHBoxLayout(self)
+        self.row.setContentsMargins(0, 0, 0, 0)
+        self.row.setSpacing(GAP)
+
+    def show_value(self, value: Any) -> None:
+        """What the scene has."""
+        raise NotImplementedError
+
+
+class NumberField(Field):
+    """A number, with a slider where the range is one that a hand can use."""
+
+    def __init__(self, name: str, info: ParamInfo, sink: Sink) -> None:
+        super().__init__(name, info, sink)
+        self.spin = Spin(info)
+        self.slider: Slider | None = None
+        self._value = 0.0
+        self._gesture = False
+        low, high = slider_range(info)
+        self._low, self._high = low, high
+        if high > low:
+            self.slider = Slider(Qt.Orientation.Horizontal)
+            self.slider.setRange(0, _STEPS)
+            self.slider.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+            self.slider.sliderPressed.connect(self._pressed)
+            self.slider.sliderReleased.connect(self._released)
+            self.slider.valueChanged.connect(self._slid)
+            self.row.addWidget(self.slider, 1)
+            self.spin.setMaximumWidth(86)
+        self.row.addWidget(self.spin, 0 if self.slider else 1)
+        self.spin.valueChanged.connect(self._typed)
+
+    def show_value(self, value: Any) -> None:
+        """What the scene has."""
+        self._value = float(value)
+        with QSignalBlocker(self.spin):
+            self.spin.setValue(self._value)
+        if self.slider is not None and not self.slider.isSliderDown():
+            with QSignalBlocker(self.slider):
+                self.slider.setValue(round(_STEPS * self._share(self._value)))
+
+    def _share(self, value: float) -> float:
+        value = min(max(value, self._low), self._high)
+        if self.info.scale == "log":
+            return math.log(value / self._low) / math.log(self._high / self._low)
+        return (value - self._low) / (self._high - self._low)
+
+    def _at(self, share: float) -> float | int:
+        if self.info.scale == "log":
+            value = (
+                0.0 if share == 0 and self.info.low == 0 else self._low * (self._high / self._low) ** share
+            )
+            value = float(f"{value:.3g}")
+        else:
+            value = self._low + share * (self._high - self._low)
+        value = min(max(value, self.info.low), self.info.high)
+        return round(value) if self.info.kind == "integer" else value
+
+    def _pressed(self) -> None:
+        self._gesture = self.sink.begin(self.name)
+
+    def _slid(self, step: int) -> None:
+        value = self._at(step / _STEPS)
+        with QSignalBlocker(self.spin):
+            self.spin.setValue(value)
+        if self._gesture:
+            self.sink.preview(self.name, value)
+        elif self.slider is not None and not self.slider.isSliderDown():
+            self.sink.apply(self.name, value)
+
+    def _released(self) -> None:
+        if self._gesture:
+            self._gesture = False
+            self.sink.commit()
+
+    def _typed(self, value: float) -> None:
+        if abs(value - self._value) >= 0.5 * 10.0 ** -self.spin.decimals():  # what is shown is rounded
+            self._value = value
+            self.sink.apply(self.name, round(value) if self.info.kind == "integer" else value)
+
+
+class FlagField(Field):
+    """Yes or no."""
+
+    def __init__(self, name: str, info: ParamInfo, sink: Sink) -> None:
+        super().__init__(name, info, sink)
+        self.box = QCheckBox()
+        self.row.addWidget(self.box)
+        self.row.addStretch(1)
+        self.box.toggled.connect(lambda on: self.sink.apply(self.name, on))
+
+    def show_value(self, value: Any) -> None:
+        """What the scene has."""
+        with QSignalBlocker(self.box):
+            self.box.setChecked(bool(value))
+
+
+class ChoiceField(Field):
+    """One of several texts."""
+
+    def __init__(self, name: str, info: ParamInfo, sink: Sink) -> None:
+        super().__init__(name, info, sink)
+        self.combo = Combo()
+        self.combo.addItems(list(info.choices))
+        self.row.addWidget(self.combo, 1)
+        self.combo.activated.connect(lambda i: self.sink.apply(self.name, self.info.choices[i]))
+
+    def show_value(self, value: Any) -> None:
+        """What the scene has."""
+        with QSignalBlocker(self.combo):
+            self.combo.setCurrentText(str(value))
+
+
+class TextField(Field):
+    """A line of text."""
+
+    def __init__(self, name: str, info: ParamInfo, sink: Sink) -> None:
+        super().__init__(name, info, sink)
+        self.edit = QLineEdit()
+        self.row.addWidget(self.edit, 1)
+        self._value = ""
+        self.edit.editingFinished.connect(self._typed)
+
+    def show_value(self, value: Any) -> None:
+        """What the scene has."""
+        if str(value) != self._value or not self.edit.hasFocus():
+            self._value = str(value)
+            self.edit.setText(self._value)
+
+    def _typed(self) -> None:
+        if self.edit.text() != self._value:
+            self._value = self.edit.text()
+            self.sink.apply(self.name, self._value)
+
+
+class ColourField(Field):
+    """A colour, chosen as the display shows it and kept scene-linear."""
+
+    def __init__(self, name: str, info: ParamInfo, sink: Sink) -> None:
+        super().__init__(name, info, sink)
+        self.button = ColourButton(info.label, reflectance=info.high <= 1)
+        self.button.began = lambda: sink.begin(name)
+        self.button.previewed = lambda colour: sink.preview(name, colour)
+        self.button.committed = sink.commit
+        self.button.cancelled = sink.cancel
+        self.row.addWidget(self.button, 1)
+
+    def show_value(self, value: Any) -> None:
+        """What the scene has."""
+        self.button.show_colour(value)
+
+
+FIELDS: dict[str, type[Field]] = {
+    "number": NumberField,
+    "integer": NumberField,
+    "flag": FlagField,
+    "choice": ChoiceField,
+    "text": TextField,
+    "colour": ColourField,
+}
+"""The control of every kind of parameter."""
+
+
+def tip(info: ParamInfo) -> str:
+    """What it means, its unit and range."""
+    parts = [info.doc or info.label]
+    if info.kind in ("number", "integer") and math.isfinite(info.low) and info.high < 1e8:
+        parts.append(f"{info.low:g} to {info.high:g}{' ' + info.unit if info.unit else ''}")
+    return "\n".join(parts)
+
+
+def slider_range(info: ParamInfo) -> tuple[float, float]:
+    """What a slider spans; an empty range where none makes sense."""
+    if info.scale == "log":
+        return (info.low, info.high) if info.low > 0 and info.high <= 1e7 else (0.01, min(info.high, 1000.0))
+    if info.unit == "°" and info.high - info.low > 360:
+        return -180.0, 180.0
+    if info.high - info.low <= 200 or info.unit == "K":
+        return info.low, min(info.high, 12000.0) if info.unit == "K" else info.high
+    return 0.0, 0.0

@@ -1,0 +1,57 @@
+"""What the program has to say: notes and problems in a designer's words, kept for the log panel."""
+
+from __future__ import annotations
+
+import time
+import traceback
+from collections import deque
+from dataclasses import dataclass
+from typing import Literal
+
+from studio_core.errors import LucarneError
+from studio_core.signal import Signal
+
+Level = Literal["note", "warning", "problem"]
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One line; `detail` is for whoever looks closer (a traceback)."""
+
+    level: Level
+    text: str
+    detail: str
+    time: float
+
+
+class Journal:
+    """`added(entry)` after every line. The window's thread only."""
+
+    def __init__(self, limit: int = 500) -> None:
+        self.entries: deque[Entry] = deque(maxlen=limit)
+        self.added: Signal[[Entry]] = Signal()
+        self.cleared: Signal[[]] = Signal()
+
+    def write(self, text: str, level: Level = "note", detail: str = "") -> None:
+        """Add a line."""
+        entry = Entry(level, text, detail, time.time())
+        self.entries.append(entry)
+        self.added.emit(entry)
+
+    def problem(self, doing: str, error: BaseException) -> str:
+        """Add what went wrong while `doing`; the sentence that was written.
+
+        Errors made for people are shown as they stand, others are introduced and kept as a traceback.
+        """
+        if isinstance(error, LucarneError):
+            text = str(error)
+        else:
+            cause = str(error).strip().splitlines()[0] if str(error).strip() else type(error).__name__
+            text = f"{doing} did not work because of a fault in the program or a plugin ({cause})."
+        self.write(text, "problem", "".join(traceback.format_exception(error)))
+        return text
+
+    def clear(self) -> None:
+        """Forget all lines."""
+        self.entries.clear()
+        self.cleared.emit()

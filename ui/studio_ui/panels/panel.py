@@ -1,0 +1,98 @@
+"""What every panel has: a context, subscriptions that end with it, and a scroll area where it is long."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QScrollArea, QToolButton, QVBoxLayout, QWidget
+
+from studio_ui.context import Context, Subscriptions
+from studio_ui.icons import icon
+from studio_ui.theme import DARK, GAP, Theme
+
+
+class Panel(QWidget):
+    """Base of the panels: `id` names it in stored layouts, `title` is shown."""
+
+    id = ""
+    title = ""
+
+    def __init__(self, context: Context) -> None:
+        super().__init__()
+        self.context = context
+        self.subscriptions = Subscriptions()
+        self.theme = DARK
+        self._icons: list[tuple[QToolButton, str]] = []
+        self.column = QVBoxLayout(self)
+        self.column.setContentsMargins(GAP, GAP, GAP, GAP)
+        self.column.setSpacing(GAP)
+
+    def close_panel(self) -> None:
+        """Stop listening; called once when the window goes."""
+        self.subscriptions.close()
+
+    def set_theme(self, theme: Theme) -> None:
+        """Icons and colours of another theme."""
+        self.theme = theme
+        for button, name in self._icons:
+            button.setIcon(icon(name, theme.text, theme.on_accent))
+
+    def tool(self, name: str, tip: str) -> QToolButton:
+        """A small button with an icon."""
+        button = QToolButton()
+        button.setToolTip(tip)
+        button.setAccessibleName(tip)
+        button.setAutoRaise(True)
+        button.setIcon(icon(name, self.theme.text, self.theme.on_accent))
+        self._icons.append((button, name))
+        return button
+
+    def scroller(self) -> QVBoxLayout:
+        """A column inside a vertical scroll area that fills the panel's rest."""
+        area = QScrollArea()
+        area.setWidgetResizable(True)
+        area.setFrameShape(QFrame.Shape.NoFrame)
+        area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        inside = QWidget()
+        column = QVBoxLayout(inside)
+        column.setContentsMargins(0, 0, 2, 0)
+        column.setSpacing(GAP)
+        area.setWidget(inside)
+        self.column.addWidget(area, 1)
+        return column
+
+
+def row(*widgets: QWidget, stretch: int = -1) -> QHBoxLayout:
+    """Widgets side by side; the one at index `stretch` takes the room."""
+    layout = QHBoxLayout()
+    layout.setContentsMargins(0, 0, 0, 0)
+    layout.setSpacing(4)
+    for index, widget in enumerate(widgets):
+        layout.addWidget(widget, 1 if index == stretch else 0)
+    if stretch < 0:
+        layout.addStretch(1)
+    return layout
+
+
+def heading(text: str) -> QLabel:
+    """A title inside a panel."""
+    label = QLabel(text)
+    label.setProperty("role", "title")
+    return label
+
+
+def note(text: str) -> QLabel:
+    """A remark that wraps."""
+    label = QLabel(text)
+    label.setProperty("role", "dim")
+    label.setWordWrap(True)
+    return label
+
+
+def clear(layout: QVBoxLayout) -> None:
+    """Remove everything in a column."""
+    while layout.count():
+        item = layout.takeAt(0)
+        widget = item.widget()
+        if widget is not None:
+            widget.hide()
+            widget.deleteLater()

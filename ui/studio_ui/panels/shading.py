@@ -1,0 +1,86 @@
+"""Shading: which backend computes the picture, and how finely."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from PySide6.QtWidgets import QWidget
+
+from studio_core.contract import ShadingBackend
+from studio_core.errors import PluginError
+from studio_core.params import Value, defaults, param_infos
+from studio_ui.context import Context
+from studio_ui.fields import Combo
+from studio_ui.panels.panel import Panel, clear, note
+from studio_ui.param_form import ParamForm, form_label, form_layout
+from studio_ui.sinks import PlainSink
+
+
+class ShadingPanel(Panel):
+    """The session's backend and its parameters; no edits of the document."""
+
+    id = "shading"
+    title = "Shading"
+
+    def __init__(self, context: Context) -> None:
+        super().__init__(context)
+        self.form: ParamForm | None = None
+        self.combo = Combo()
+        self._column = self.scroller()
+        self.subscriptions.add(
+            context.warmed.connect(self.refresh), context.session.changed.connect(self._told)
+        )
+        self.refresh()
+
+    def refresh(self) -> None:
+        """Build the form of the session's backend."""
+        clear(self._column)
+        self.form = None
+        self.combo = Combo()
+        host, session = self.context.host, self.context.session
+        names = list(host.names("backend"))
+        for name in names:
+            backend = self._backend(name)
+            self.combo.addItem(backend.label if backend is not None else name, name)
+        self.combo.setCurrentIndex(self.combo.findData(session.backend))
+        self.combo.setEnabled(self.context.warm)
+        self.combo.activated.connect(lambda i: session.shade_with(names[i]))
+        box = QWidget()
+        form_layout(box).addRow(form_label("Method", "How light is computed"), self.combo)
+        self._column.addWidget(box)
+        backend = self._backend(session.backend)
+        if backend is not None:
+            self.form = ParamForm(param_infos(backend.Params), PlainSink(self._set))
+            self._column.addWidget(self.form)
+            self.form.show_values(self._values(backend, session.params))
+        elif not self.context.warm:
+            self._column.addWidget(note("Loading…"))
+        self._column.addStretch(1)
+        self._shown = session.backend
+
+    def _backend(self, name: str) -> ShadingBackend | None:
+        if not self.context.warm:
+            return None
+        try:
+            made: ShadingBackend = self.context.host.get("backend", name)
+        except PluginError:
+            return None
+        return made
+
+    def _values(self, backend: ShadingBackend, chosen: Mapping[str, Any]) -> dict[str, Any]:
+        return {**defaults(backend.Params), **chosen}
+
+    def _set(self, name: str, value: Value) -> None:
+        session = self.context.session
+        if session.params.get(name) != value:
+            session.shade_with(session.backend, {**session.params, name: value})
+
+    def _told(self, aspect: object) -> None:
+        session = self.context.session
+        if session.backend != self._shown:
+            self.refresh()
+        elif self.form is not None:
+            backend = self._backend(session.backend)
+            if backend is not None:
+                self.form.show_values(self._values(backend, session.params))

@@ -1,0 +1,162 @@
+"""Colours and spacing: a dark and a light theme, neutral so that they do not tint the eye."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from string import Template
+
+from PySide6.QtGui import QColor, QPalette
+from PySide6.QtWidgets import QApplication
+
+GAP = 6  # pixels between things, everywhere
+PANEL_WIDTH = 300
+
+
+@dataclass(frozen=True)
+class Theme:
+    """Named colours; `canvas` surrounds the picture."""
+
+    name: str
+    window: str
+    base: str
+    raised: str
+    border: str
+    text: str
+    dim: str
+    accent: str
+    on_accent: str
+    canvas: str
+    warning: str
+    problem: str
+
+
+DARK = Theme(
+    name="dark",
+    window="#2c2c2d",
+    base="#222223",
+    raised="#3a3a3c",
+    border="#19191a",
+    text="#dededd",
+    dim="#9b9b99",
+    accent="#e0a24a",
+    on_accent="#1d1a15",
+    canvas="#191919",
+    warning="#e8c15a",
+    problem="#f0806c",
+)
+LIGHT = Theme(
+    name="light",
+    window="#ededec",
+    base="#fbfbfa",
+    raised="#ffffff",
+    border="#c9c9c6",
+    text="#242423",
+    dim="#6d6d6a",
+    accent="#b06f12",
+    on_accent="#ffffff",
+    canvas="#c4c4c2",
+    warning="#8a6500",
+    problem="#b3351f",
+)
+THEMES = {theme.name: theme for theme in (DARK, LIGHT)}
+
+_SHEET = Template("""
+QToolTip { background: $raised; color: $text; border: 1px solid $border; padding: 3px 5px; }
+QMainWindow::separator { background: $border; width: 3px; height: 3px; }
+QMainWindow::separator:hover { background: $accent; }
+QMenuBar { background: $window; padding: 2px 4px; }
+QMenuBar::item { padding: 4px 9px; border-radius: 3px; background: transparent; }
+QMenuBar::item:selected { background: $raised; }
+QMenu { background: $raised; border: 1px solid $border; padding: 4px; }
+QMenu::item { padding: 5px 26px 5px 24px; border-radius: 3px; }
+QMenu::item:selected { background: $accent; color: $on_accent; }
+QMenu::item:disabled { color: $dim; }
+QMenu::separator { height: 1px; background: $border; margin: 4px 6px; }
+QToolBar { background: $window; border: none; border-bottom: 1px solid $border; padding: 3px 6px;
+    spacing: 2px; }
+QToolBar::separator { width: 1px; background: $border; margin: 4px 5px; }
+QToolButton { border: 1px solid transparent; border-radius: 4px; padding: 4px; }
+QToolButton:hover { background: $raised; }
+QToolButton:pressed, QToolButton:checked { background: $accent; color: $on_accent; }
+QToolButton::menu-indicator { image: none; }
+QDockWidget { color: $dim; font-weight: 600; }
+QDockWidget::title { background: $window; padding: 6px 8px; border-bottom: 1px solid $border; }
+QTabBar::tab { background: transparent; color: $dim; padding: 5px 10px; border: none;
+               border-bottom: 2px solid transparent; }
+QTabBar::tab:selected { color: $text; border-bottom-color: $accent; }
+QTabBar::tab:hover { color: $text; }
+QStatusBar { background: $window; border-top: 1px solid $border; color: $dim; }
+QStatusBar::item { border: none; }
+QStatusBar QLabel { color: $dim; padding: 0 6px; }
+QTreeView, QListView, QTableView, QPlainTextEdit { background: $base; border: 1px solid $border;
+    border-radius: 4px; outline: 0; selection-background-color: $accent; selection-color: $on_accent; }
+QTreeView::item, QListView::item { padding: 3px 2px; }
+QTreeView::item:hover, QListView::item:hover { background: $raised; }
+QTreeView::item:selected, QListView::item:selected { background: $accent; color: $on_accent; }
+QHeaderView::section { background: $window; color: $dim; border: none; padding: 4px 6px; }
+QLineEdit, QSpinBox, QDoubleSpinBox, QComboBox { background: $base; border: 1px solid $border;
+    border-radius: 4px; padding: 3px 6px; min-height: 18px; selection-background-color: $accent;
+    selection-color: $on_accent; }
+QLineEdit:focus, QSpinBox:focus, QDoubleSpinBox:focus, QComboBox:focus { border-color: $accent; }
+QLineEdit:disabled, QSpinBox:disabled, QDoubleSpinBox:disabled, QComboBox:disabled { color: $dim; }
+QComboBox QAbstractItemView { background: $raised; border: 1px solid $border; outline: 0; }
+QPushButton { background: $raised; border: 1px solid $border; border-radius: 4px; padding: 5px 12px; }
+QPushButton:hover { border-color: $accent; }
+QPushButton:pressed, QPushButton:checked { background: $accent; color: $on_accent; }
+QPushButton:default { border-color: $accent; }
+QPushButton:disabled { color: $dim; }
+QProgressBar { background: $base; border: 1px solid $border; border-radius: 3px; max-height: 8px; }
+QProgressBar::chunk { background: $accent; border-radius: 2px; }
+QSlider::groove:horizontal { height: 4px; background: $base; border: 1px solid $border; border-radius: 2px; }
+QSlider::sub-page:horizontal { background: $accent; border-radius: 2px; }
+QSlider::handle:horizontal { width: 11px; margin: -5px 0; border-radius: 6px; background: $text; }
+QSlider::sub-page:horizontal:disabled, QSlider::handle:horizontal:disabled { background: $dim; }
+QScrollArea { border: none; background: transparent; }
+QScrollBar:vertical { width: 10px; background: transparent; margin: 0; }
+QScrollBar:horizontal { height: 10px; background: transparent; margin: 0; }
+QScrollBar::handle { background: $raised; border-radius: 4px; min-height: 24px; min-width: 24px;
+    margin: 1px; }
+QScrollBar::add-line, QScrollBar::sub-line { width: 0; height: 0; }
+QScrollBar::add-page, QScrollBar::sub-page { background: transparent; }
+QGroupBox { border: none; border-top: 1px solid $border; margin-top: 14px; padding-top: 6px;
+    font-weight: 600; }
+QGroupBox::title { subcontrol-origin: margin; left: 0; color: $dim; }
+QLabel[role="dim"] { color: $dim; }
+QLabel[role="warning"] { color: $warning; }
+QLabel[role="problem"] { color: $problem; }
+QLabel[role="title"] { font-weight: 600; }
+""")
+
+
+def palette(theme: Theme) -> QPalette:
+    """The theme as Qt's palette, for what the style sheet leaves alone."""
+    made = QPalette()
+    role = QPalette.ColorRole
+    pairs = {
+        role.Window: theme.window,
+        role.WindowText: theme.text,
+        role.Base: theme.base,
+        role.AlternateBase: theme.raised,
+        role.ToolTipBase: theme.raised,
+        role.ToolTipText: theme.text,
+        role.Text: theme.text,
+        role.Button: theme.raised,
+        role.ButtonText: theme.text,
+        role.BrightText: theme.problem,
+        role.Highlight: theme.accent,
+        role.HighlightedText: theme.on_accent,
+        role.Link: theme.accent,
+        role.PlaceholderText: theme.dim,
+    }
+    for key, colour in pairs.items():
+        made.setColor(key, QColor(colour))
+    for key in (role.WindowText, role.Text, role.ButtonText):
+        made.setColor(QPalette.ColorGroup.Disabled, key, QColor(theme.dim))
+    return made
+
+
+def wear(application: QApplication, theme: Theme) -> None:
+    """Dress the whole application."""
+    application.setStyle("Fusion")
+    application.setPalette(palette(theme))
+    application.setStyleSheet(_SHEET.substitute(vars(theme)))
