@@ -25,6 +25,7 @@ from studio_plugins.meshes.common import (
     read_bytes,
     refuse,
 )
+from studio_plugins.meshes.polygons import triangulate
 
 
 @dataclass(frozen=True)
@@ -59,9 +60,12 @@ def _read(path: Path, data: bytes, kind: str, notes: Notes) -> tuple[Any, Any, A
             found = load_ply(io.BytesIO(data)) if kind == "ply" else load_stl(io.BytesIO(data))
         positions = np.asarray(found.get("vertices", ()), dtype=np.float64).reshape(-1, 3)
         faces = found.get("faces")
-        faces = np.asarray(() if faces is None else faces).reshape(-1, 3)
+        faces = np.zeros((0, 3), np.int64) if faces is None else np.asarray(faces)
         inside = np.asarray(((faces >= 0) & (faces < len(positions))).all(axis=1))
         faces = faces[inside].astype(np.int64)
+        if faces.shape[1] > 3:
+            sizes = np.full(len(faces), faces.shape[1])
+            faces = faces.ravel()[triangulate(positions, faces.ravel(), sizes)[0]]
     except Exception as error:  # the reader raises whatever a damaged file provokes
         raise refuse(path, f"it is damaged ({type(error).__name__})") from None
     if len(faces) > MOST_FACES:
