@@ -7,6 +7,7 @@ the scheduler; results come back through the injected `post`.
 
 from __future__ import annotations
 
+import logging
 import queue
 import threading
 from collections.abc import Callable
@@ -19,6 +20,8 @@ from studio_core.shading.frame import Frame
 from studio_core.shading.job import Job
 from studio_core.shading.pipeline import Pipeline
 from studio_core.signal import Signal
+
+log = logging.getLogger(__name__)
 
 
 class Executor(Protocol):
@@ -63,7 +66,10 @@ class ComputeThread:
 
     def _loop(self) -> None:
         while (work := self._queue.get()) is not None:
-            work()
+            try:
+                work()
+            except BaseException:  # whoever submitted it should have caught it; others still need the thread
+                log.exception("work on the compute thread failed")
 
 
 class Scheduler:
