@@ -25,6 +25,7 @@ _SQLITE = (
     ("SQLITE_INTERRUPT", "it is damaged: reading it finds no end"),
     ("SQLITE_AUTH", "it is damaged: it asks for what a project never needs"),
 )
+_LONGEST = 500
 _ERRNO = {
     errno.ENOSPC: "the disk is full",
     errno.EDQUOT: "your disk quota is used up",
@@ -47,7 +48,8 @@ def cause(error: BaseException) -> str:
         for prefix, text in _SQLITE:
             if name.startswith(prefix):
                 return text
-        return f"it is damaged: {error}"
+        text = str(error)
+        return f"it is damaged: {'a text is not UTF-8' if 'UTF-8' in text else text}"
     if isinstance(error, OSError):
         return _ERRNO.get(error.errno or 0, (error.strerror or str(error)).lower())
     if isinstance(error, MemoryError):
@@ -57,15 +59,22 @@ def cause(error: BaseException) -> str:
     return f"it is damaged: {error}"
 
 
+def plain(text: str) -> str:
+    """A text in one line, whatever a file put into it, and not endless."""
+    line = "".join(c if c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in text)
+    return line if len(line) <= _LONGEST else f"{line[:_LONGEST]}…"
+
+
 @contextmanager
 def explained(path: Path, verb: str) -> Iterator[None]:
     """Turn what goes wrong inside into a ProjectError "NAME could not be `verb`: cause"."""
     try:
         yield
     except ProjectError as error:
-        text = str(error)
-        if path.name in text:
+        text = plain(str(error))
+        named = path.name in text
+        if named and text == str(error):
             raise
-        raise ProjectError(f"{path.name} could not be {verb}: {text}") from error
+        raise ProjectError(text if named else f"{path.name} could not be {verb}: {text}") from error
     except (sqlite3.Error, sqlite3.Warning, OSError, MemoryError, RecursionError, UnicodeError) as error:
-        raise ProjectError(f"{path.name} could not be {verb}: {cause(error)}") from error
+        raise ProjectError(f"{path.name} could not be {verb}: {plain(cause(error))}") from error

@@ -205,9 +205,9 @@ class Rows:
         count = len(ref.parts())
         query = f"SELECT part, length(data) FROM blob WHERE hash = ? ORDER BY part LIMIT {count + 1}"
         rows = self._select(query, (ref.blob,)) if count else []
-        if [row[0] for row in rows] != list(range(count)):
+        if [row[0] for row in rows] != list(range(count)) or any(type(row[1]) is not int for row in rows):
             raise ProjectError(f"{part} is damaged: an array ({ref.blob[:8]}…) is missing or incomplete")
-        check_parts(ref, [int(row[1]) for row in rows], part, squeezed=squeezed)
+        check_parts(ref, [row[1] for row in rows], part, squeezed=squeezed)
         self._blobs.add(ref.blob)
         self._bytes += ref.nbytes
         if self._bytes > MAX_BYTES:

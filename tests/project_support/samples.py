@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
+import sqlite3
+from pathlib import Path
 
 import numpy as np
 
@@ -46,3 +48,21 @@ def small_scene(seed: int = 0, *, faces: int = 200) -> Scene:
 def renamed(scene: Scene, name: str) -> Scene:
     """The scene with its first chair under another name."""
     return scene.with_nodes(dataclasses.replace(scene["a"], name=name))
+
+
+def hot_journal(path: Path) -> bytes:
+    """Leave the file as a save that was killed half way leaves it; the journal."""
+    journal = path.with_name(f"{path.name}-journal")
+    connection = sqlite3.connect(path, isolation_level=None)
+    connection.execute("PRAGMA cache_size=1")
+    connection.execute("BEGIN EXCLUSIVE")
+    connection.execute("UPDATE meta SET value = value || ' '")
+    connection.execute("UPDATE item SET json = json || ' '")
+    connection.execute("UPDATE blob SET data = data || zeroblob(10000)")
+    half, data = path.read_bytes(), journal.read_bytes()
+    connection.execute("ROLLBACK")
+    connection.close()
+    assert half != path.read_bytes()
+    path.write_bytes(half)
+    journal.write_bytes(data)
+    return data

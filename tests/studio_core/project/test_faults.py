@@ -7,15 +7,17 @@ import os
 import random
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
 from project_support import disk
-from project_support.samples import small_scene
+from project_support.samples import hot_journal, small_scene
 
 from studio_core.errors import ProjectError
 from studio_core.project.codec import scene_digest
+from studio_core.project.lock import acquire
 from studio_core.project.store import load, save
 from studio_core.scene.geometry import Image
 from studio_core.scene.nodes import Environment
@@ -80,33 +82,52 @@ def test_a_power_cut_loses_nothing_that_was_acknowledged(tmp_path: Path, library
     assert seen == set(digests)
 
 
-def full_disk(folder: Path) -> bool:
-    command = ["mount", "-t", "tmpfs", "-o", "size=2m", "tmpfs", str(folder)]
+def mounted(folder: Path, options: str) -> bool:
+    command = ["mount", "-t", "tmpfs", "-o", options, "tmpfs", str(folder)]
     try:
         return subprocess.run(command, capture_output=True, timeout=30, check=False).returncode == 0
     except OSError:
         return False
 
 
-def test_a_disk_that_is_really_full(tmp_path: Path) -> None:
+@pytest.fixture
+def tiny_disk(tmp_path: Path) -> Iterator[Path]:
     folder = tmp_path / "small"
     folder.mkdir()
-    if not hasattr(os, "geteuid") or os.geteuid() != 0 or not full_disk(folder):
+    if not hasattr(os, "geteuid") or os.geteuid() != 0 or not mounted(folder, "size=2m"):
         pytest.skip("a 2 MB disk can only be mounted by root")
-    try:
-        path = folder / "p.lucarne"
-        save(path, small_scene(1))
-        noise = np.random.default_rng(0).integers(0, 256, (1000, 1000, 3), dtype=np.uint8)
-        too_much = small_scene(2).with_nodes(Environment(id="n", image=Image(noise)))
-        for way in ("in place", "whole"):
-            with pytest.raises(ProjectError, match=r"p\.lucarne could not be saved: the disk is full"):
-                save(path, too_much, way=way)  # type: ignore[arg-type]
-            assert scene_digest(load(path).scene) == scene_digest(small_scene(1))
-            assert [entry.name for entry in folder.iterdir()] == ["p.lucarne"]
-        with pytest.raises(ProjectError, match="the disk is full"):
-            save(folder / "other.lucarne", too_much)
-        assert not (folder / "other.lucarne").exists()
-        save(path, small_scene(3))
-        assert scene_digest(load(path).scene) == scene_digest(small_scene(3))
-    finally:
-        subprocess.run(["umount", str(folder)], check=True, timeout=30)
+    yield folder
+    subprocess.run(["umount", str(folder)], check=True, timeout=30)
+
+
+def test_a_disk_that_is_really_full(tiny_disk: Path) -> None:
+    path = tiny_disk / "p.lucarne"
+    save(path, small_scene(1))
+    noise = np.random.default_rng(0).integers(0, 256, (1000, 1000, 3), dtype=np.uint8)
+    too_much = small_scene(2).with_nodes(Environment(id="n", image=Image(noise)))
+    for way in ("in place", "whole"):
+        with pytest.raises(ProjectError, match=r"p\.lucarne could not be saved: the disk is full"):
+            save(path, too_much, way=way)  # type: ignore[arg-type]
+        assert scene_digest(load(path).scene) == scene_digest(small_scene(1))
+        assert [entry.name for entry in tiny_disk.iterdir()] == ["p.lucarne"]
+    with pytest.raises(ProjectError, match="the disk is full"):
+        save(tiny_disk / "other.lucarne", too_much)
+    assert not (tiny_disk / "other.lucarne").exists()
+    save(path, small_scene(3))
+    assert scene_digest(load(path).scene) == scene_digest(small_scene(3))
+
+
+def test_a_disk_that_is_read_only(tiny_disk: Path) -> None:
+    path, cut = tiny_disk / "p.lucarne", tiny_disk / "cut.lucarne"
+    save(path, small_scene(1))
+    save(cut, small_scene(1))
+    hot_journal(cut)
+    subprocess.run(["mount", "-o", "remount,ro", str(tiny_disk)], check=True, timeout=30)
+    for fresh in (False, True):
+        with pytest.raises(ProjectError, match=r"p\.lucarne could not be saved: .*(read-only|cannot be)"):
+            save(path, small_scene(2), fresh=fresh)
+    with pytest.raises(ProjectError, match=r"p\.lucarne could not be locked: the disk is read-only"):
+        acquire(path)
+    assert scene_digest(load(path).scene) == scene_digest(small_scene(1))
+    with pytest.raises(ProjectError, match=r"cut\.lucarne was interrupted .* read-only: copy it"):
+        load(cut)

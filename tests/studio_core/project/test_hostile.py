@@ -14,17 +14,14 @@ from typing import Any
 
 import numpy as np
 import pytest
+from project_support.forge import Forge, Json
 from project_support.samples import renamed, small_scene
 
-from studio_core.arrays import content_hash
 from studio_core.document import Step
 from studio_core.errors import ProjectError
-from studio_core.project.canonical import text_hash
 from studio_core.project.codec import scene_digest
 from studio_core.project.records import History
 from studio_core.project.store import info, load, newest, save
-
-Json = dict[str, Any]
 
 
 @pytest.fixture
@@ -49,51 +46,6 @@ def refused(path: Path, match: str) -> None:
         load(path)
     assert "victim.lucarne" in str(caught.value)
     assert "\n" not in str(caught.value)
-
-
-class Forge:
-    """Rewrites items of a file and every address above them, as somebody would who knows the format."""
-
-    def __init__(self, path: Path) -> None:
-        self.connection = sqlite3.connect(path, isolation_level=None)
-        self.items: dict[str, str] = dict(self.connection.execute("SELECT hash, json FROM item"))
-
-    def put(self, text: str) -> str:
-        address = text_hash(text)
-        self.connection.execute("INSERT OR REPLACE INTO item VALUES (?, ?)", (address, text))
-        return address
-
-    def blob(self, array: np.ndarray[Any, Any], data: bytes | None = None) -> Json:
-        address = content_hash(array)
-        stored = array.tobytes() if data is None else data
-        self.connection.execute("INSERT OR REPLACE INTO blob VALUES (?, 0, ?)", (address, stored))
-        return {"blob": address, "dtype": array.dtype.str, "shape": list(array.shape)}
-
-    def scene(self, nodes: list[str], materials: list[str], **more: Any) -> None:
-        roots = [
-            self.put(json.dumps({"type": "page", "level": 0, "of": hashes})) if hashes else None
-            for hashes in (nodes, materials)
-        ]
-        text = json.dumps({"type": "scene", "nodes": roots[0], "materials": roots[1], **more})
-        self.head([self.put(text), None, None])
-
-    def head(self, addresses: list[str | None]) -> None:
-        self.connection.execute("UPDATE revision SET items = ?", (json.dumps(addresses),))
-        self.connection.close()
-
-    def change(self, edit: Callable[[Json], Any]) -> None:
-        """Put `edit(item)` in the place of every node and material; it may return raw text."""
-        made: dict[str, list[str]] = {"nodes": [], "materials": []}
-        for text in self.items.values():
-            value = json.loads(text)
-            if value["type"] in ("page", "scene", "step", "history", "session"):
-                continue
-            if value["name"] == "Before":
-                continue
-            kind = "materials" if value["type"] == "material" else "nodes"
-            new = edit(value)
-            made[kind].append(self.put(new if isinstance(new, str) else json.dumps(new or value)))
-        self.scene(made["nodes"], made["materials"])
 
 
 def forge(path: Path, kind: str, edit: Callable[[Json], Any]) -> None:
@@ -214,6 +166,8 @@ TRAPS: list[tuple[str, Callable[[Json], Any], str]] = [
     ("material", lambda v: {**v, "values": {"x": {"y": 1.0}}}, "values ▸ x is not a number"),
     ("material", lambda v: {**v, "values": {"x": [1.0, 2.0]}}, "values ▸ x is not a number"),
     ("material", lambda v: {**v, "values": {"x": 1 << 63}}, "values ▸ x is not a whole number"),
+    ("material", lambda v: {**v, "values": {"x\n\x1b[2J": None}}, "x��.2J is not a number"),
+    ("material", lambda v: {**v, "values": {"x" * 9000: None}}, "…$"),
     ("material", lambda v: {**v, "textures": {"albedo": None}}, "textures ▸ albedo"),
     ("material", lambda v: {**v, "opacity": None}, "opacity"),
 ]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import sqlite3
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
@@ -12,7 +11,7 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from project_support.samples import renamed, small_scene
+from project_support.samples import hot_journal, renamed, small_scene
 from project_support.strategies import scenes
 
 from studio_core.document import Document, Step
@@ -259,24 +258,6 @@ def test_a_stale_journal_never_reaches_a_new_file(tmp_path: Path) -> None:
     path.with_name("j.lucarne-journal").write_bytes(journal)
     save(path, small_scene(4))
     assert scene_digest(load(path).scene) == scene_digest(small_scene(4))
-
-
-def hot_journal(path: Path) -> bytes:
-    """Leave the file as a save that was killed half way leaves it; the journal."""
-    journal = path.with_name(f"{path.name}-journal")
-    connection = sqlite3.connect(path, isolation_level=None)
-    connection.execute("PRAGMA cache_size=1")
-    connection.execute("BEGIN EXCLUSIVE")
-    connection.execute("UPDATE meta SET value = value || ' '")
-    connection.execute("UPDATE item SET json = json || ' '")
-    connection.execute("UPDATE blob SET data = data || zeroblob(10000)")
-    half, data = path.read_bytes(), journal.read_bytes()
-    connection.execute("ROLLBACK")
-    connection.close()
-    assert half != path.read_bytes()
-    path.write_bytes(half)
-    journal.write_bytes(data)
-    return data
 
 
 def test_a_symlink_is_followed(tmp_path: Path) -> None:
