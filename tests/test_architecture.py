@@ -92,7 +92,7 @@ def test_core_and_plugins_run_without_qt_installed() -> None:
         ".".join(path.relative_to(root).with_suffix("").parts).removesuffix(".__init__")
         for root, top in ((ROOT, "studio_core"), (ROOT / "plugins", "studio_plugins"))
         for path in sorted((root / top).rglob("*.py"))
-        if not path.stem.endswith("_child") and "\nimport mitsuba" not in path.read_text()
+        if not path.stem.endswith(("_child", "_bsdfs"))
     ]
     assert "studio_core.document" in names
     python(
