@@ -68,9 +68,9 @@ class MitsubaExporter:
         ):
             root.append(Element("default", name=name, value=str(value)))
         materials = Materials(scene, registry, root, folder)
-        bounds = _objects(root, scene, folder, materials)
-        notes, visible = add_lights(root, scene, folder, bounds)
-        notes += add_cameras(root, scene, bounds, self.camera)
+        _objects(root, scene, folder, materials)
+        notes, visible = add_lights(root, scene, folder)
+        notes += add_cameras(root, scene, self.camera, (self.width, self.height))
         integrator = put(root, "integrator", "path")
         prop(integrator, "integer", "max_depth", "$max_depth")
         prop(integrator, "boolean", "hide_emitters", not visible)
@@ -85,19 +85,16 @@ class MitsubaExporter:
         return tuple(notes)
 
 
-def _objects(root: Element, scene: Scene, folder: Path, materials: Materials) -> npt.NDArray[np.float64]:
-    """Write all shown objects; the bounds (2, 3) of the scene in the world."""
+def _objects(root: Element, scene: Scene, folder: Path, materials: Materials) -> None:
+    """Write all shown objects."""
     uses: dict[tuple[str, tuple[MaterialId, ...]], list[MeshObject]] = {}
     for node in scene.of(MeshObject):
         if scene.shown(node.id):
             uses.setdefault((node.geometry.key, node.materials), []).append(node)
     files: dict[str, list[tuple[str, ShadedPart]]] = {}
-    corners = []
     for number, ((key, slots), nodes) in enumerate(uses.items()):
         if key not in files:
             files[key] = _meshes(nodes[0], folder, len(files))
-        for node in nodes:
-            corners.append(_world_bounds(node.geometry.bounds, scene.world(node.id).matrix()))
         if len(nodes) == 1:
             for file, part in files[key]:
                 shape = _shape(root, file, part, slots, materials)
@@ -113,10 +110,6 @@ def _objects(root: Element, scene: Scene, folder: Path, materials: Materials) ->
             instance = put(root, "shape", "instance")
             ref(instance, f"group-{number}")
             matrix(instance, "to_world", scene.world(node.id).matrix())
-    if not corners:
-        return np.array([[-1.0, -1, -1], [1, 1, 1]])
-    every = np.concatenate(corners)
-    return np.stack([every.min(axis=0), every.max(axis=0)])
 
 
 def _shape(
@@ -160,12 +153,6 @@ def write_ply(path: Path, part: ShadedPart) -> None:
         file.write("\n".join(header).encode())
         file.write(np.concatenate(columns, axis=1).astype("<f4").tobytes())
         file.write(faces.tobytes())
-
-
-def _world_bounds(bounds: npt.NDArray[np.float64], world: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
-    corners = np.stack(np.meshgrid(*bounds.T, indexing="ij"), axis=-1).reshape(-1, 3)
-    moved: npt.NDArray[np.float64] = corners @ world[:3, :3].T + world[:3, 3]
-    return moved
 
 
 EXPORTER = MitsubaExporter()

@@ -20,6 +20,7 @@ import numpy as np
 import numpy.typing as npt
 
 from studio_core.imaging.encode import write_exr
+from studio_core.scene.bounds import scene_bounds
 from studio_core.scene.geometry import Image
 from studio_core.scene.nodes import (
     AreaLamp,
@@ -31,7 +32,7 @@ from studio_core.scene.nodes import (
     Scene,
     SpotLamp,
 )
-from studio_core.scene.transform import looking
+from studio_core.session import View, framing
 from studio_core.shading.materials import linear
 from studio_plugins.export.mitsuba_xml import matrix, prop, put, rgb, vector
 
@@ -56,7 +57,7 @@ def resampled(image: Image) -> npt.NDArray[np.float32]:
     return made
 
 
-def add_lights(root: Element, scene: Scene, folder: Path, bounds: F64) -> tuple[list[str], bool]:
+def add_lights(root: Element, scene: Scene, folder: Path) -> tuple[list[str], bool]:
     """Write every shown light; notes, and whether the environment is to be seen."""
     notes, visible = [], True
     shown = [light for light in scene.of(Light) if scene.shown(light.id)]
@@ -66,7 +67,8 @@ def add_lights(root: Element, scene: Scene, folder: Path, bounds: F64) -> tuple[
     for environment in environments[:1]:
         _environment(root, environment, folder)
         visible = environment.background
-    reach = max(float(np.linalg.norm(bounds[1] - bounds[0])), 1.0)
+    low, high = scene_bounds(scene)
+    reach = max(float(np.linalg.norm(high - low)), 1.0)
     for light in shown:
         world = _rigid(scene.world(light.id).matrix())
         if isinstance(light, AreaLamp):
@@ -117,17 +119,16 @@ def _area(root: Element, light: AreaLamp, world: F64) -> None:
     rgb(put(made, "bsdf", "diffuse"), "reflectance", (0, 0, 0))
 
 
-def add_cameras(root: Element, scene: Scene, bounds: F64, camera: str | None) -> list[str]:
-    """Write the cameras, the chosen one (by name or id) first; where there is none, one that sees all."""
+def add_cameras(root: Element, scene: Scene, camera: str | None, size: tuple[int, int]) -> list[str]:
+    """Write the cameras, the chosen one (by name or id) first; where there is none, the studio's view."""
     cameras = list(scene.of(Camera))
     cameras.sort(key=lambda c: camera not in (c.name, c.id))
     for found in cameras:
         _camera(root, scene.world(found.id).matrix(), found.fov)
     if cameras:
         return []
-    centre, size = bounds.mean(axis=0), float(np.linalg.norm(bounds[1] - bounds[0]))
-    eye = centre + max(size, 1e-3) * np.array([0.6, 0.5, 1.2])
-    _camera(root, looking(eye, centre).matrix(), 45.0)
+    view = framing(*scene_bounds(scene), View(width=size[0], height=size[1]))
+    _camera(root, view.transform.matrix(), view.fov)
     return ["The scene has no camera; one that sees everything was added."]
 
 

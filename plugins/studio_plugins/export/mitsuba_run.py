@@ -94,7 +94,8 @@ def vertex_irradiance(
 ) -> Estimate:
     """(V, 3) irradiance of points under all lights, with traced visibility.
 
-    See `vertex_radiance`; irradiance is π times the radiance of a white matte point.
+    See `vertex_radiance`; irradiance is π times the radiance of a white matte point. To compare with a
+    tracer, give its own ray origins and offset 0: in creases a millionth of a metre decides.
     """
     white = {"type": "diffuse", "reflectance": {"type": "rgb", "value": 1.0}}
     made = vertex_radiance(scene, positions, normals, normals, white, spp, offset=offset)
@@ -116,9 +117,9 @@ def vertex_radiance(
 
     `scene` is an exported folder or a loaded Mitsuba scene (llvm_ad_rgb); `bsdf` a Mitsuba dictionary,
     the same for all points, seen from the side that `normals` (V, 3) point to. Rays start `offset` metres
-    above the points. Each light takes `spp` samples a point, of which environments and area lights
-    spend as many again on the BSDF (multiple importance sampling, balance heuristic). Samples are a
-    shifted rank-1 lattice in `REPLICATES` independent shifts, whose spread is the standard error.
+    above the points. Each light takes `spp` samples a point, and environments and area lights
+    as many again by the BSDF (multiple importance sampling, balance heuristic). Samples are an evenly
+    spread sequence in `REPLICATES` independent shifts, whose differences give the standard error.
     """
     mi = mitsuba()
     import drjit as dr
