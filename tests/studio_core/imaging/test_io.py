@@ -90,6 +90,27 @@ def test_layers_and_the_first_coloured_part_are_read(decoder: ImageDecoder, tmp_
     np.testing.assert_array_equal(decoder.read(tmp_path / "lamp.exr").pixels, lamp)
 
 
+def test_the_first_part_with_colour_is_read(decoder: ImageDecoder, tmp_path: Path) -> None:
+    import OpenImageIO as oiio  # noqa: N813
+
+    depth, colour = picture(1), picture(3)
+    specs = []
+    for name, pixels in (("depth", depth), ("beauty", colour)):
+        spec = oiio.ImageSpec(pixels.shape[1], pixels.shape[0], pixels.shape[2], oiio.FLOAT)
+        spec.attribute("oiio:subimagename", name)
+        specs.append(spec)
+    specs[0].channelnames = ("Z",)
+    output = oiio.ImageOutput.create("parts.exr")
+    assert output.open(str(tmp_path / "parts.exr"), specs)
+    assert output.write_image(depth)
+    assert output.open(str(tmp_path / "parts.exr"), specs[1], "AppendSubimage")
+    assert output.write_image(colour)
+    assert output.close()
+    image, facts = decoder.read_with_facts(tmp_path / "parts.exr")
+    np.testing.assert_array_equal(image.pixels, colour)
+    assert "Part 2" in facts.notes[0]
+
+
 def test_a_data_window_is_put_into_its_display_window(decoder: ImageDecoder, tmp_path: Path) -> None:
     import OpenImageIO as oiio  # noqa: N813
 
