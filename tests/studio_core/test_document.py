@@ -206,6 +206,12 @@ class UndoMachine(RuleBasedStateMachine):
         assert len(self.other.history) == 2
 
     def teardown(self) -> None:
+        try:
+            self.go_back_and_forth()
+        finally:
+            shutil.rmtree(self.folder)
+
+    def go_back_and_forth(self) -> None:
         if self.gesture is not None:
             self.document.cancel()
         self.document.go_to(len(self.prints) - 1)
@@ -216,7 +222,6 @@ class UndoMachine(RuleBasedStateMachine):
         while self.document.redo():
             pass
         assert fingerprint(self.document.scene) == self.prints[-1]
-        shutil.rmtree(self.folder)
 
 
 TestUndo = UndoMachine.TestCase
