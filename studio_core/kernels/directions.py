@@ -22,6 +22,7 @@ from studio_core.jit import kernel
 F32 = npt.NDArray[np.float32]
 F64 = npt.NDArray[np.float64]
 I32 = npt.NDArray[np.int32]
+I64 = npt.NDArray[np.int64]
 
 SMALLEST, LARGEST = 10, 17
 
@@ -217,6 +218,57 @@ class DirectionSet:
         cones = NodeCones(axes, cosine.astype(np.float32))
         cones.axis.flags.writeable = cones.cos_half_angle.flags.writeable = False
         return cones
+
+    @cached_property
+    def packet_cones(self) -> tuple[F32, F32]:
+        """Axes (9 S/64, 3) and sines of the half angles of the nodes of 64 leaves, then of 8."""
+        groups = self.size // 64
+        cones, tops, packets = self.cones, slice(groups, 2 * groups), slice(8 * groups, 16 * groups)
+        axes = np.concatenate([cones.axis[tops], cones.axis[packets]])
+        cosines = np.concatenate([cones.cos_half_angle[tops], cones.cos_half_angle[packets]])
+        return axes, np.sqrt(np.maximum(1.0 - cosines.astype(np.float64) ** 2, 0.0)).astype(np.float32)
+
+
+@dataclass(frozen=True, eq=False)
+class DirectionList:
+    """Some cells of the set of 2^k directions, such as those where the light is: zeros fill up to 64."""
+
+    k: int
+    leaves: I64
+    """(N,) which cells, in tree order."""
+
+    @property
+    def size(self) -> int:
+        """N rounded up to a multiple of 64."""
+        return -(-len(self.leaves) // 64) * 64
+
+    @property
+    def solid_angle(self) -> float:
+        """Of each cell, in steradians."""
+        return direction_set(self.k).solid_angle
+
+    @cached_property
+    def directions(self) -> F32:
+        """(size, 3): unit directions, then zeros, which no ray follows."""
+        made = np.zeros((self.size, 3), np.float32)
+        made[: len(self.leaves)] = direction_set(self.k).directions[self.leaves]
+        return made
+
+    @cached_property
+    def packet_cones(self) -> tuple[F32, F32]:
+        """Axes and sines of cones about every 64 directions, then about every 8."""
+        axes, sines = [], []
+        for block in (64, 8):
+            groups = self.directions.astype(np.float64).reshape(-1, block, 3)
+            axis = groups.sum(axis=1)
+            length = np.linalg.norm(axis, axis=1, keepdims=True)
+            axis = np.where(length > 1e-9, axis / np.maximum(length, 1e-9), (0.0, 1.0, 0.0))
+            there = groups.any(axis=2)
+            cosine = np.where(there, np.einsum("gnc,gc->gn", groups, axis), 1.0).min(axis=1)
+            sine = np.sqrt(np.maximum(1 - cosine**2, 0.0)) + 1e-4
+            axes.append(axis)
+            sines.append(np.where(cosine > 0, sine, 2.0))  # more than a half sphere is never skipped
+        return np.concatenate(axes).astype(np.float32), np.concatenate(sines).astype(np.float32)
 
 
 @functools.lru_cache(maxsize=LARGEST - SMALLEST + 1)

@@ -87,7 +87,7 @@ def environment_terms(
     out_terms: F32,
     out_irradiance: F32,
 ) -> None:
-    """Terms (V, TERMS, 3) and irradiance (V, 3) of points[start:stop].
+    """Adds terms (V, TERMS, 3) and irradiance (V, 3) of points[start:stop].
 
     `bits` (len(points), S/64) are their visibility words; directions (S, 3) are world.
     """
@@ -136,12 +136,12 @@ def environment_terms(
                 packed[count + j] = wi[BATCH + j]
                 packed[2 * count + j] = wi[2 * BATCH + j]
             _flush(count, address[m], terms[m], shape, wo, packed, light, values, sums)
-        for k in range(out_terms.shape[1]):
+        for k in range(terms[m]):
             for c in range(3):
-                out_terms[p, k, c] = sums[k, c] * solid_angle if k < terms[m] else 0.0
-        out_irradiance[p, 0] = red * solid_angle
-        out_irradiance[p, 1] = green * solid_angle
-        out_irradiance[p, 2] = blue * solid_angle
+                out_terms[p, k, c] += sums[k, c] * solid_angle
+        out_irradiance[p, 0] += red * solid_angle
+        out_irradiance[p, 1] += green * solid_angle
+        out_irradiance[p, 2] += blue * solid_angle
 
 
 @kernel

@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from studio_core.jit import call_address, kernel
-from studio_core.kernels.directions import DirectionSet
+from studio_core.kernels.directions import DirectionList, DirectionSet
 from studio_core.kernels.packets import DIRECTION, MASK, OPAQUE, ORIGIN, TFAR, new_packet
 from studio_core.kernels.raycast import RayCaster
 from studio_core.parallel import Checkpoints, Workers
@@ -127,7 +127,7 @@ def trace_visibility(
     caster: RayCaster,
     points: npt.ArrayLike,
     normals: npt.ArrayLike,
-    directions: DirectionSet,
+    directions: DirectionSet | DirectionList,
     workers: Workers,
     job: Checkpoints | None = None,
     *,
@@ -154,11 +154,7 @@ def trace_visibility(
     words = np.empty((count, groups), np.uint64) if out is None else out
     if words.shape != (count, groups) or words.dtype != np.uint64:
         raise ValueError(f"out must be uint64 of the shape ({count}, {groups})")
-    cones = directions.cones
-    tops, packets = slice(groups, 2 * groups), slice(8 * groups, 16 * groups)
-    axes = np.concatenate([cones.axis[tops], cones.axis[packets]])
-    cosines = np.concatenate([cones.cos_half_angle[tops], cones.cos_half_angle[packets]]).astype(np.float64)
-    sines = np.sqrt(np.maximum(1.0 - cosines**2, 0.0)).astype(np.float32)
+    axes, sines = directions.packet_cones
     handles = caster.handles()
     counts = np.zeros((count, 2), np.int64)
 
@@ -177,7 +173,7 @@ def trace_visibility(
             stop,
         )
 
-    workers.run(count, max(1, RAYS_A_CHUNK // directions.size), body, job)
+    workers.run(count, max(1, RAYS_A_CHUNK // max(directions.size, 1)), body, job)
     rays, skipped = (int(total) for total in counts.sum(axis=0))
     caster.count(rays)
     return Visibility(words, rays, skipped)

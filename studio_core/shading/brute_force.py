@@ -9,7 +9,9 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from studio_core.kernels.directions import DirectionSet, direction_set
+from studio_core.arrays import content_hash
+from studio_core.kernels.directions import DirectionList, DirectionSet, direction_set
+from studio_core.kernels.light_tree import LightTree
 from studio_core.kernels.radiance import BATCH, environment_terms, lamp_terms
 from studio_core.kernels.visibility import occlusion_rays, trace_visibility
 from studio_core.parallel import Workers
@@ -30,37 +32,43 @@ Points = npt.NDArray[np.int64]
 
 POINTS = 512  # vertices a chunk: a checkpoint every few milliseconds at 2^10 directions
 BITS_LIMIT = 1 << 30
+BLOCK_BYTES = 64 << 20
+HEAVY = 2e-4  # share of all light above which a direction is split
+
+Directions = DirectionSet | DirectionList
 
 
 class VisibilityBits:
-    """Visibility of shading vertices over direction sets, traced when first asked for.
+    """Visibility of shading vertices over sets of directions, traced when first asked for.
 
     bits[p, w] bit b: direction 64·w + b leaves vertex p unoccluded and above its shading horizon.
     """
 
     def __init__(self, surfaces: Surfaces, casters: Casters, workers: Workers) -> None:
         self._surfaces, self._casters, self._workers = surfaces, casters, workers
-        self._bits: dict[int, npt.NDArray[np.uint64]] = {}
-        self._done: dict[int, npt.NDArray[np.bool_]] = {}
+        self._kept: dict[str, tuple[npt.NDArray[np.uint64], npt.NDArray[np.bool_]]] = {}
         self.rays = 0
+        self.skipped = 0
 
-    def of(self, points: Points, directions: DirectionSet, job: Job) -> npt.NDArray[np.uint64]:
+    def of(self, points: Points, directions: Directions, job: Job) -> npt.NDArray[np.uint64]:
         """(len(points), S/64) words; kept unless all vertices would need over 1 GiB."""
-        count, words = len(self._surfaces.mesh.positions), len(directions.directions) // 64
-        level = directions.k
+        count, words = len(self._surfaces.mesh.positions), directions.size // 64
         if count * words * 8 > BITS_LIMIT:
             return self._trace(points, directions, job)
-        if level not in self._bits:
-            self._bits[level] = np.zeros((count, words), np.uint64)
-            self._done[level] = np.zeros(count, np.bool_)
-        missing = points[~self._done[level][points]]
+        key = _key(directions)
+        if key not in self._kept:
+            if isinstance(directions, DirectionList):  # the light has changed: one list a level is enough
+                self._kept.pop(next((k for k in self._kept if k.startswith(f"{directions.k} ")), ""), None)
+            self._kept[key] = np.zeros((count, words), np.uint64), np.zeros(count, np.bool_)
+        bits, done = self._kept[key]
+        missing = points[~done[points]]
         if len(missing):
-            self._bits[level][missing] = self._trace(missing, directions, job)
-            self._done[level][missing] = True
-        kept: npt.NDArray[np.uint64] = self._bits[level][points]
-        return kept
+            bits[missing] = self._trace(missing, directions, job)
+            done[missing] = True
+        wanted: npt.NDArray[np.uint64] = bits[points]
+        return wanted
 
-    def _trace(self, points: Points, directions: DirectionSet, job: Job) -> npt.NDArray[np.uint64]:
+    def _trace(self, points: Points, directions: Directions, job: Job) -> npt.NDArray[np.uint64]:
         mesh = self._surfaces.mesh
         found = trace_visibility(
             self._casters.shadow,
@@ -73,13 +81,41 @@ class VisibilityBits:
             inset=mesh.inset[points],
         )
         self.rays += found.rays
+        self.skipped += found.skipped
         return found.words
+
+
+def _key(directions: Directions) -> str:
+    if isinstance(directions, DirectionList):
+        return f"{directions.k} {content_hash(directions.leaves)}"
+    return str(directions.k)
 
 
 def blank_layer(surfaces: Surfaces) -> LayerRadiance:
     """A layer without light."""
     count = len(surfaces.mesh.positions)
     return LayerRadiance(np.zeros((count, TERMS, 3), np.float32), np.zeros((count, 3), np.float32))
+
+
+def split_light(tree: LightTree, level: int) -> list[tuple[Directions, F32]]:
+    """Directions and radiance to sum over: the leaves of 2^level, the brightest of them in quarters.
+
+    One visibility ray stands for a leaf. Where a leaf holds over `HEAVY` of all light, the error of a
+    shadow's edge in it would show, so its four parts are looked at one by one (up to 2^17).
+    """
+    leaves = np.array(tree.coarsened(level).radiance)
+    found: list[tuple[Directions, F32]] = [(direction_set(level), leaves)]
+    if level + 2 > tree.k:
+        return found
+    light = leaves.sum(axis=1)
+    heavy = np.flatnonzero(light > HEAVY * light.sum())
+    if len(heavy):
+        leaves[heavy] = 0
+        parts = DirectionList(level + 2, (heavy[:, None] * 4 + np.arange(4)).ravel())
+        bright = np.zeros((parts.size, 3), np.float32)
+        bright[: len(parts.leaves)] = tree.coarsened(level + 2).radiance[parts.leaves]
+        found.append((parts, bright))
+    return found
 
 
 def environment_layer(
@@ -92,42 +128,47 @@ def environment_layer(
     level: int,
     workers: Workers,
     job: Job,
-    onto: LayerRadiance | None = None,
 ) -> LayerRadiance:
-    """The environment's layer at unit gain for `points`, over 2^level directions."""
-    layer = onto or blank_layer(surfaces)
+    """The environment's layer at unit gain for `points`, over 2^level directions and their parts."""
+    layer, mesh = blank_layer(surfaces), surfaces.mesh
     if lighting.tree is None or not len(points):
         return layer
-    mesh, directions = surfaces.mesh, direction_set(level)
-    leaves = lighting.tree.coarsened(level).radiance
     local_eye = (eye - mesh.origin).astype(np.float32)
-    step = max(POINTS, min(len(points), (64 << 20) // (len(directions.directions) // 8)))
-    for first in range(0, len(points), step):
-        block = points[first : first + step]
-        bits = visibility.of(block, directions, job)
+    for directions, leaves in split_light(lighting.tree, level):
+        step = max(POINTS, BLOCK_BYTES * 8 // max(directions.size, 1))
+        for first in range(0, len(points), step):
+            block = points[first : first + step]
+            bits = visibility.of(block, directions, job)
 
-        def run(start: int, stop: int, block: Points = block, bits: npt.NDArray[np.uint64] = bits) -> None:
-            environment_terms(
-                start,
-                stop,
-                block,
-                mesh.positions,
-                mesh.normals,
-                mesh.material,
-                local_eye,
-                bits,
-                directions.directions,
-                leaves,
-                directions.solid_angle,
-                shapes.address,
-                shapes.terms,
-                shapes.offset,
-                shapes.data,
-                layer.terms,
-                layer.irradiance,
-            )
+            def run(
+                start: int,
+                stop: int,
+                block: Points = block,
+                bits: npt.NDArray[np.uint64] = bits,
+                directions: Directions = directions,
+                leaves: F32 = leaves,
+            ) -> None:
+                environment_terms(
+                    start,
+                    stop,
+                    block,
+                    mesh.positions,
+                    mesh.normals,
+                    mesh.material,
+                    local_eye,
+                    bits,
+                    directions.directions,
+                    leaves,
+                    directions.solid_angle,
+                    shapes.address,
+                    shapes.terms,
+                    shapes.offset,
+                    shapes.data,
+                    layer.terms,
+                    layer.irradiance,
+                )
 
-        workers.run(len(block), POINTS, run, job)
+            workers.run(len(block), POINTS, run, job)
     return layer
 
 

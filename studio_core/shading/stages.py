@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from studio_core.contract import Services
 from studio_core.kernels.camera import first_hits, sample_directions
+from studio_core.kernels.directions import LARGEST
 from studio_core.kernels.light_tree import LightTree, integrate_environment
 from studio_core.kernels.raycast import CasterObject, RayCaster
 from studio_core.params import param
@@ -30,7 +31,6 @@ from studio_core.shading.pipeline import Inputs
 BODIES = Aspect.STRUCTURE | Aspect.GEOMETRY
 CHUNK = 1 << 14
 LAYERS = 6  # most transparent surfaces looked through
-FINEST = 15  # direction sets up to 2^15 share one integration of the environment
 
 
 @dataclass(frozen=True)
@@ -141,11 +141,11 @@ class ShapeStage:
 
 
 class LightingStage:
-    """The environment integrated over the finest leaves, and all lamps, at unit gain."""
+    """The environment integrated over the finest leaves there are, and all lamps, at unit gain."""
 
     needs: tuple[type, ...] = ()
     gives = Lighting
-    dirtied_by = Aspect.LIGHT | Aspect.QUALITY
+    dirtied_by = Aspect.LIGHT
 
     def __init__(self, services: Services) -> None:
         self._workers = services.workers
@@ -158,16 +158,14 @@ class LightingStage:
         tree: LightTree | None = None
         key: object = None
         if environment is not None:
-            wanted = int(getattr(frame.params, "directions", 1 << FINEST)).bit_length() - 1
-            level = max(wanted, FINEST)
-            key = (environment.image.key, environment.azimuth, environment.tilt, level)
+            key = (environment.image.key, environment.azimuth, environment.tilt)
             previous: Lighting | None = inputs.previous
             if previous is not None and previous.integrated == key:
                 tree = previous.tree
             else:
                 rotation = environment.rotation().matrix()[:3, :3]
                 pixels = environment.image.pixels[..., :3]
-                leaves = integrate_environment(pixels, rotation, level, self._workers, job)
+                leaves = integrate_environment(pixels, rotation, LARGEST, self._workers, job)
                 tree = LightTree.build(leaves)
         return Lighting(environment, tree, lamps(scene), key)
 

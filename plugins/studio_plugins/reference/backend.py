@@ -19,7 +19,6 @@ from studio_core.shading.artifacts import Casters, Hits, LayerRadiance, Lighting
 from studio_core.shading.brute_force import (
     VisibilityBits,
     all_points,
-    blank_layer,
     environment_layer,
     lamp_layer,
 )
@@ -99,11 +98,11 @@ class ReferenceStage:
                     level,
                     self._workers,
                     job,
-                    blank_layer(surfaces),
                 )
             final = level == last
-            rays = inputs[VisibilityBits].rays
-            made = Radiance(surfaces, hits, dict(layers), valid, 1 << level, final, {"rays": rays})
+            traced = inputs[VisibilityBits]
+            counts = {"rays": traced.rays, "packets_below_horizon": traced.skipped}
+            made = Radiance(surfaces, hits, dict(layers), valid, 1 << level, final, counts)
             if not final:
                 job.publish(made)
         assert made is not None

@@ -43,7 +43,7 @@ def test_environment_sum_equals_the_oracle(host):
     visible = rng.random((count, directions.size)) < 0.6
     light = rng.gamma(0.5, 1.0, (directions.size, 3)).astype(np.float32)
     eye = np.array([0.3, 4.0, 1.0], np.float32)
-    out, irradiance = np.full((count, TERMS, 3), 7, np.float32), np.zeros((count, 3), np.float32)
+    out, irradiance = np.zeros((count, TERMS, 3), np.float32), np.zeros((count, 3), np.float32)
     points = np.arange(count, dtype=np.int64)
     arguments = (positions, normals, material, eye, _words(visible), directions.directions, light)
     environment_terms(
