@@ -21,6 +21,8 @@ class Forge:
 
     def __init__(self, path: Path) -> None:
         self.connection = sqlite3.connect(path, isolation_level=None)
+        self.connection.execute("PRAGMA synchronous=OFF")
+        self.connection.execute("BEGIN")
         self.items: dict[str, str] = dict(self.connection.execute("SELECT hash, json FROM item"))
 
     def put(self, text: str) -> str:
@@ -44,6 +46,11 @@ class Forge:
 
     def head(self, addresses: list[str | None]) -> None:
         self.connection.execute("UPDATE revision SET items = ?", (json.dumps(addresses),))
+        self.close()
+
+    def close(self) -> None:
+        """Keep what was changed."""
+        self.connection.execute("COMMIT")
         self.connection.close()
 
     def change(self, edit: Callable[[Json], Any]) -> None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import sqlite3
 import struct
-import time
 import tracemalloc
 import zlib
 from collections.abc import Callable
@@ -277,11 +276,9 @@ def test_pages_that_multiply_are_refused(path: Path) -> None:
     scene = forged.put(json.dumps({"type": "scene", "nodes": below, "materials": None}))
     history = forged.put(json.dumps({"type": "history", "steps": below, "position": 0}))
     forged.head([scene, history, None])
-    started = time.monotonic()
-    refused(path, "more than")
+    refused(path, "more than")  # an honest reader of 256^13 entries would never come back
     with pytest.raises(ProjectError, match="more than"):
         info(path)
-    assert time.monotonic() - started < 60  # without the bound it would not end in this universe's time
 
 
 @pytest.mark.parametrize(
@@ -310,7 +307,7 @@ def test_a_history_that_leads_elsewhere_is_refused(path: Path) -> None:
             moved = forged.put(json.dumps({**json.loads(text), "position": 0}))
             ((items,),) = forged.connection.execute("SELECT items FROM revision").fetchall()
             forged.connection.execute("UPDATE revision SET items = ?", (items.replace(address, moved),))
-    forged.connection.close()
+    forged.close()
     refused(path, "does not lead to the scene")
 
 
