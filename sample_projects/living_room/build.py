@@ -10,7 +10,7 @@ from studio_core.scene.transform import Transform
 from ..modelling.equirect import stored
 from ..modelling.parts import Part, Stage, placed
 from . import decor, seating, tables
-from .materials import palette
+from .materials import palette as palette
 from .window_room import HIGH, LOW, day_room
 
 TILE = 2.4
@@ -22,7 +22,7 @@ def build(light_height: int = 512) -> Scene:
     furnish(stage)
     stage.camera("Living room", (2.62, 1.42, 2.18), (-0.66, 0.60, -0.80), 34.0)
     stage.camera("Reading corner", (-0.72, 1.3, 2.15), (0.28, 0.66, -1.7), 34.0)
-    stage.camera("Coffee table", (0.75, 1.1, 0.75), (-0.72, 0.42, -0.95), 34.0)
+    stage.camera("Vase and books", (0.75, 1.1, 0.75), (-0.72, 0.42, -0.95), 34.0)
     picture, scale = day_room(light_height)
     light = Environment(
         id="light-day", name="Daylight through two windows", image=stored(picture), luminance_scale=scale
@@ -34,12 +34,11 @@ def furnish(stage: Stage) -> None:
     """Puts everything but cameras and the light of the day on the stage."""
     width, depth = HIGH[0] - LOW[0], HIGH[2] - LOW[2]
     room = stage.group("Room")
-    stage.put([decor.floor(width, depth, TILE)], room)
-    back = Part("Skirting board back", decor.skirting(width), ("painted wood",))
-    left = Part("Skirting board left", decor.skirting(depth), ("painted wood",))
-    stage.put([back], room, placed(0.0, LOW[2]))
-    stage.put([left], room, placed(LOW[0], 0.0, 90.0))
-    stage.put([decor.rug(2.5, 1.75)], room, placed(-0.72, -0.72, 4.0))
+    rug_size, rug_place = (2.5, 1.75), placed(-0.72, -0.72, 4.0)
+    stage.put([decor.floor(width, depth, TILE, rug_place, rug_size)], room)
+    board = Part("Skirting board", decor.skirting(width), ("painted wood",))
+    stage.put([board], room, placed(0.0, LOW[2]))
+    stage.put([decor.rug(*rug_size)], room, rug_place)
     stage.put(seating.sofa(), stage.group("Sofa", placed(-0.85, -1.85)))
     stage.put(seating.armchair(), stage.group("Armchair", placed(0.86, -1.3, -38.0)))
     coffee = stage.group("Coffee table", placed(-0.72, -0.72, 3.0))

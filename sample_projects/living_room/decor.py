@@ -7,7 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..modelling.mesh import Array, Mesh, joined, spline
+from studio_core.scene.transform import Transform
+
+from ..modelling.mesh import Array, Mesh, facing, grid_faces, joined, spline
 from ..modelling.parts import Part
 from ..modelling.shapes import box, circle, lathe, leaf, leg, plane, rounded_box, sweep
 
@@ -100,7 +102,7 @@ def picture(width: float, height: float) -> list[Part]:
     for y in (bar / 2, height - bar / 2):
         rods.append(rounded_box((width, bar, deep), 0.003, (4, 1, 1), 1).moved(y=y, z=deep / 2))
     for x in (-1, 1):
-        upright = rounded_box((bar, height - 2 * bar, deep), 0.003, (1, 3, 1), 1)
+        upright = rounded_box((bar - 0.001, height - 2 * bar + 0.004, deep - 0.001), 0.003, (1, 3, 1), 1)
         rods.append(upright.moved(x * (width - bar) / 2, height / 2, deep / 2))
     sheet = plane(width - 2 * bar, height - 2 * bar, (10, 8))
     sheet = replace(sheet, uvs=sheet.uvs / np.array([width - 2 * bar, height - 2 * bar]))
@@ -131,10 +133,26 @@ def rug(width: float, depth: float) -> Part:
     return Part("Rug", mesh.bent(waves).mapped(0, 2, width, depth), ("rug",), textured=True)
 
 
-def floor(width: float, depth: float, tile: float) -> Part:
-    """The floor; its texture repeats every `tile` metres."""
-    mesh = plane(width, depth)
-    return Part("Floor", replace(mesh, uvs=mesh.uvs / tile), ("floor",), textured=True)
+def floor(width: float, depth: float, tile: float, rug: Transform, rug_size: tuple[float, float]) -> Part:
+    """The floor; its texture repeats every `tile` metres.
+
+    It has edges just beside and just below the rim of the rug that lies on it, so that the dark below the
+    rug does not bleed out over a whole cell of a mesh that is shaded at its vertices.
+    """
+    signs = np.array([(-1.0, 1.0), (1.0, 1.0), (1.0, -1.0), (-1.0, -1.0)])
+    rings = [signs * [width / 2, depth / 2]]
+    matrix = rug.matrix()
+    for margin in (0.012, -0.004):
+        around = signs * (np.array(rug_size) / 2 + margin)
+        points = np.stack([around[:, 0], np.zeros(4), around[:, 1]], 1) @ matrix[:3, :3].T + matrix[:3, 3]
+        rings.append(points[:, [0, 2]])
+    flat = np.concatenate(rings)
+    points = np.stack([flat[:, 0], np.zeros(len(flat)), flat[:, 1]], 1)
+    ring_faces = grid_faces(3, 4, wrap=True)
+    faces = np.concatenate([ring_faces, [[8, 9, 10], [8, 10, 11]]])
+    uvs = (flat * [1.0, -1.0] + [width / 2, depth / 2]) / tile
+    up = np.tile([0.0, 1.0, 0.0], (len(points), 1))
+    return Part("Floor", facing(points, up, faces, uvs), ("floor",), textured=True)
 
 
 def skirting(length: float) -> Mesh:

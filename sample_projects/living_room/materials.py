@@ -16,7 +16,7 @@ def palette() -> dict[str, Material]:
         "wool": material("Sand bouclé", "lambert", base_color=(0.52, 0.46, 0.37)),
         "terracotta wool": material("Terracotta wool", "lambert", base_color=(0.47, 0.17, 0.085)),
         "ochre linen": material("Ochre linen", "lambert", base_color=(0.56, 0.36, 0.11)),
-        "leather": material("Cognac leather", "ggx", base_color=(0.34, 0.135, 0.052), roughness=0.48),
+        "leather": material("Cognac leather", "ggx", base_color=(0.42, 0.165, 0.06), roughness=0.45),
         "oak": material(
             "Oiled oak",
             "blinn-phong",
@@ -31,15 +31,21 @@ def palette() -> dict[str, Material]:
             specular=(0.06, 0.06, 0.06),
             exponent=45.0,
         ),
-        "walnut": material("Walnut", "ggx", base_color=(0.175, 0.095, 0.052), roughness=0.45),
+        "walnut": material("Walnut", "ggx", base_color=(0.24, 0.125, 0.066), roughness=0.45),
         "grained walnut": material(
             "Walnut, grained",
             "ggx",
             {"base_color": Texture(textures.grain())},
-            base_color=(0.25, 0.135, 0.075),
+            base_color=(0.34, 0.18, 0.095),
             roughness=0.42,
         ),
-        "lacquer": material("White lacquer", "ggx", base_color=(0.74, 0.73, 0.70), roughness=0.4),
+        "lacquer": material(
+            "White lacquer",
+            "blinn-phong",
+            diffuse=(0.72, 0.71, 0.68),
+            specular=(0.06, 0.06, 0.06),
+            exponent=60.0,
+        ),
         "brass": material(
             "Brushed brass", "ggx", base_color=(0.81, 0.58, 0.29), metallic=1.0, roughness=0.42
         ),

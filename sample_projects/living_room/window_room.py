@@ -181,9 +181,12 @@ class Room:
         return made
 
 
-def day_room(height: int = 512) -> tuple[Array, float]:
-    """The picture (height, 2·height, 3), white-balanced and exposed, and cd/m² for a unit of luminance."""
-    room = Room()
+def day_room(height: int = 512, patch: float = 0.32) -> tuple[Array, float]:
+    """The picture (height, 2·height, 3), white-balanced and exposed, and cd/m² for a unit of luminance.
+
+    `patch` is the edge in metres of what the bounced light is solved on.
+    """
+    room = Room(patch)
     picture = equirect.painted(room.radiance, height)
     light = equirect.irradiance(picture, np.array([0.0, 1.0, 0.0]))
     picture = picture * equirect.balance(light, 0.8)

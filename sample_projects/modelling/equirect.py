@@ -95,5 +95,6 @@ def balance(light: Array, strength: float) -> Array:
 
 
 def stored(picture: Array) -> Image:
-    """The picture in half precision (11 significant bits), which lossless files hold in little space."""
-    return Image(np.clip(picture, 0.0, 65504.0).astype(np.float16).astype(np.float32), "linear")
+    """The picture rounded to 11 significant bits, a half's precision, so that it packs small."""
+    mantissa, exponent = np.frexp(np.maximum(picture, 0.0))
+    return Image(np.ldexp(np.round(mantissa * 2048) / 2048, exponent).astype(np.float32), "linear")

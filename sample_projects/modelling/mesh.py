@@ -111,7 +111,7 @@ def facing(positions: Array, normals: Array, faces: Indices, uvs: Array | None =
 
 
 def smoothed(mesh: Mesh) -> Mesh:
-    """The mesh with normals averaged over the faces at each vertex, weighted by angle."""
+    """The mesh with normals averaged over the faces at each vertex, weighted by angle; others stay."""
     total = np.zeros_like(mesh.positions)
     flat = unit(face_normals(mesh.positions, mesh.faces))
     for k in range(3):
@@ -120,6 +120,8 @@ def smoothed(mesh: Mesh) -> Mesh:
         two = unit(mesh.positions[mesh.faces[:, (k + 2) % 3]] - here)
         angle = np.arccos(np.clip(np.einsum("ij,ij->i", one, two), -1, 1))
         np.add.at(total, mesh.faces[:, k], flat * angle[:, None])
+    bare = ~total.any(axis=1)
+    total[bare] = mesh.normals[bare]
     return replace(mesh, normals=unit(total))
 
 

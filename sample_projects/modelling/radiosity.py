@@ -43,7 +43,7 @@ class Wall:
 
     def points(self, flat: Array) -> Array:
         """(N, 3) of coordinates (N, 2) on the wall."""
-        made = np.full((len(flat), 3), self.at)
+        made = np.full((len(flat), 3), float(self.at))
         made[:, list(self.spans)] = flat
         return made
 

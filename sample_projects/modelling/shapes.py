@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
@@ -84,7 +85,8 @@ def lathe(profile: Sequence[npt.ArrayLike], segments: int = 24) -> Mesh:
     first = 0
     for piece in profile:
         line = np.asarray(piece, dtype=np.float64)
-        along = np.gradient(line, axis=0)
+        steps = unit(np.diff(line, axis=0))
+        along = np.concatenate([steps[:1], steps]) + np.concatenate([steps, steps[-1:]])
         out = unit(np.stack([along[:, 1], -along[:, 0]], 1))
         on_axis = line[:, 0] < 1e-9
         out[on_axis, 0] = 0
@@ -161,13 +163,25 @@ def sweep(
         flat_points = points.reshape(-1, 3)
         outward = (offsets / np.linalg.norm(offsets, axis=2, keepdims=True)).reshape(-1, 3)
         return smoothed(facing(flat_points, outward, faces))
-    flat_points = np.concatenate([points.reshape(-1, 3), line[[0, -1]]])
-    poles = (count * around, count * around + 1)
-    ends = [[poles[0], (k + 1) % around, k] for k in range(around)]
-    top = (count - 1) * around
-    ends += [[poles[1], top + k, top + (k + 1) % around] for k in range(around)]
-    faces = np.concatenate([grid_faces(count, around, wrap=True), np.array(ends, np.int64)])
-    outward = np.concatenate([unit(offsets.reshape(-1, 3) + 1e-12), -tangents[:1], tangents[-1:]])
+    # The vertices of the shaft ring by ring, then the two caps: a rim (where it is sharp) and a pole each.
+    shaft = points.reshape(-1, 3)
+    rims = np.array([0, (count - 1) * around])[:, None] + np.arange(around)
+    if not round_ends:
+        rims = count * around + np.arange(2)[:, None] * (around + 1) + np.arange(around)
+        caps = [points[0], line[:1], points[-1], line[-1:]]
+        poles = rims[:, -1] + 1
+    else:
+        caps = [line[:1], line[-1:]]
+        poles = count * around + np.arange(2)
+    flat_points = np.concatenate([shaft, *caps])
+    fans = [
+        np.stack([np.full(around, pole), np.roll(rim, -1), rim], 1)
+        for pole, rim in zip(poles, rims, strict=True)
+    ]
+    faces = np.concatenate([grid_faces(count, around, wrap=True), *fans])
+    per_cap = len(flat_points) // 2 - len(shaft) // 2
+    ends = np.repeat(np.stack([-tangents[0], tangents[-1]]), per_cap, axis=0)
+    outward = np.concatenate([unit(offsets.reshape(-1, 3) + 1e-12), ends])
     return smoothed(facing(flat_points, outward, faces))
 
 
@@ -253,8 +267,17 @@ def plane(width: float, depth: float, cells: tuple[int, int] = (1, 1)) -> Mesh:
 
 
 def leg(top: Point, foot: Point, thick: float, thin: float, around: int = 8, rings: int = 5) -> Mesh:
-    """A round leg from `top` to `foot`, tapering from diameter `thick` to `thin`."""
+    """A round leg from `top` to `foot`, tapering from diameter `thick` to `thin`, level at both ends."""
     t = np.linspace(0, 1, rings)[:, None]
     path = np.array(top) * (1 - t) + np.array(foot) * t
     scale = np.interp(t[:, 0], [0, 0.2, 1], [thick, thick, thin])
-    return sweep(path, circle(around, 1.0, 1.0), scale, up=(0.0, 0.0, 1.0), round_ends=False)
+    made = sweep(path, circle(around, 1.0, 1.0), scale, up=(0.0, 0.0, 1.0), round_ends=False)
+    level, normals = made.positions.copy(), made.normals.copy()
+    cap = around + 1
+    for height, rim, end, up in (
+        (top[1], slice(0, around), slice(-2 * cap, -cap), 1.0),
+        (foot[1], slice(-2 * cap - around, -2 * cap), slice(-cap, None), -1.0),
+    ):
+        level[rim, 1] = level[end, 1] = height
+        normals[end] = (0.0, up, 0.0)
+    return replace(made, positions=level, normals=normals)

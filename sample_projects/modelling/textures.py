@@ -59,7 +59,7 @@ def planks(size: int = 1024, rows: int = 12, seed: int = 3) -> Image:
     fine, wide = fine[rows_index, columns], wide[rows_index, columns]
     rings = 0.5 + 0.5 * np.sin(14 * wide + 2.0 * board)
     value = 1 + 0.11 * tone + 0.10 * fine + 0.13 * (rings - 0.5) * (0.6 + 0.4 * np.sin(board * 1.7))
-    base = np.array([0.40, 0.255, 0.145])
+    base = np.array([0.57, 0.365, 0.19])
     hue = np.stack([1 + 0.02 * warm, np.ones_like(warm), 1 - 0.06 * warm], -1)
     colour = base * hue * np.maximum(value, 0.3)[..., None] ** np.array([0.9, 1.0, 1.12])
     edge_v = np.minimum(v * rows % 1.0, 1 - v * rows % 1.0) / rows

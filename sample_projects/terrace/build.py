@@ -22,7 +22,7 @@ def build(light_height: int = 512) -> Scene:
     stage = Stage(palette())
     furnish(stage)
     stage.camera("Terrace", (2.9, 1.62, 3.5), (-0.32, 0.92, -0.35), 36.0)
-    stage.camera("Table for two", (1.5, 1.35, 1.9), (-0.55, 0.72, -0.4), 34.0)
+    stage.camera("Under the parasol", (1.5, 1.35, 1.9), (-0.55, 0.72, -0.4), 34.0)
     picture, scale = sunny_sky(light_height)
     light = Environment(
         id="light-sky", name="Clear sky with sun", image=stored(picture), luminance_scale=scale

@@ -57,18 +57,18 @@ def parasol(radius: float = 1.45, low: float = 2.12, top: float = 2.62) -> list[
 
 
 def planter(seed: int = 9, width: float = 1.3) -> list[Part]:
-    """A long teak box, 0.45 m high, with tall grasses."""
-    deep, high = 0.4, 0.45
+    """A long teak box, 0.42 m high, with tall grasses."""
+    deep, high = 0.4, 0.42
     slats = [
         rounded_box((width, 0.098, 0.022), 0.006, (4, 1, 1), 1).moved(
-            y=0.1 + 0.105 * k, z=s * (deep / 2 - 0.011)
+            y=0.054 + 0.105 * k, z=s * (deep / 2 - 0.011)
         )
         for k in range(4)
         for s in (-1, 1)
     ]
     slats += [
         rounded_box((0.022, 0.098, deep - 0.05), 0.006, (1, 1, 1), 1).moved(
-            s * (width / 2 - 0.011), 0.1 + 0.105 * k
+            s * (width / 2 - 0.011), 0.054 + 0.105 * k
         )
         for k in range(4)
         for s in (-1, 1)

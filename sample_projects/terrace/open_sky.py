@@ -12,7 +12,7 @@ from ..modelling.mesh import Array
 from ..modelling.sky import SUN_RADIUS, Sky, sun_at
 
 SKY = Sky(turbidity=2.3, sun=sun_at(49.0, 312.0))
-UPWARD_IRRADIANCE = 4.3  # what the paving gets, in units of radiance · sr
+UPWARD_IRRADIANCE = 3.9  # what the paving gets, in units of radiance · sr
 
 
 def sunny_sky(height: int = 512) -> tuple[Array, float]:
