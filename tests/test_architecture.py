@@ -8,6 +8,7 @@ import subprocess
 import sys
 import tomllib
 import zipfile
+from itertools import chain
 from pathlib import Path
 
 import pytest
@@ -44,6 +45,30 @@ def python(source: str, **environment: str) -> str:
 def loaded_by(modules: str) -> set[str]:
     """Top-level names in `sys.modules` after importing some modules."""
     return set(python(f"import sys, {modules}; print(*{{m.split('.')[0] for m in sys.modules}})").split())
+
+
+def test_every_decision_is_in_the_index() -> None:
+    folder = ROOT / "docs" / "decisions"
+    index = (folder / "README.md").read_text()
+    numbered = sorted(path.name for path in folder.glob("[0-9]*.md"))
+    assert numbered
+    assert [name for name in numbered if f"({name})" not in index] == []
+    assert [name[:4] for name in numbered] == [f"{i:04}" for i in range(1, len(numbered) + 1)]
+
+
+def test_every_dependency_has_its_reason() -> None:
+    project = PROJECT["project"]
+    wanted = list(chain(project["dependencies"], *project["optional-dependencies"].values()))
+    names = {re.split(r"[\[<>=;]", line)[0] for line in wanted} - {"lucarne"}
+    reasons = (ROOT / "docs" / "dependencies.md").read_text()
+    assert {name for name in names if name not in reasons} == set()
+
+
+def test_pages_that_the_docs_point_to_exist() -> None:
+    pages = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *(ROOT / "docs").rglob("*.md")]
+    for page in pages:
+        for target in re.findall(r"(?<!!)\[[^]]*\]\((?!https?:)([^)#]+)", page.read_text()):
+            assert (page.parent / target).exists(), f"{page.name} points to {target}"
 
 
 def test_import_contracts_are_kept() -> None:
