@@ -181,7 +181,7 @@ def _clean(pixels: npt.NDArray[np.float32], notes: list[str]) -> npt.NDArray[np.
         return pixels
     made = pixels.copy()
     finite = made[np.isfinite(made) & ~bright]
-    largest = float(max(finite.max(), 0.0)) if finite.size else 0.0
+    largest = max(float(finite.max()), 0.0) if finite.size else 0.0
     made[bright] = largest
     made[negative] = 0
     if nan.any():

@@ -74,8 +74,8 @@ def lamp_light(lamp: Lamp, targets: F64, positions: F64) -> tuple[F32, F32]:
     """
     count, samples = len(positions), len(targets)
     if lamp.kind == "directional":
-        directions = np.broadcast_to(targets[:, :3].astype(np.float32), (count, samples, 3))
-        return np.ascontiguousarray(directions), np.full((count, samples), 1 / samples, np.float32)
+        parallel = np.broadcast_to(targets[:, :3].astype(np.float32), (count, samples, 3))
+        return np.ascontiguousarray(parallel), np.full((count, samples), 1 / samples, np.float32)
     towards = targets[:, :3] - positions[:, None]
     distance = np.maximum(np.linalg.norm(towards, axis=2), 1e-6)
     directions = towards / distance[..., None]

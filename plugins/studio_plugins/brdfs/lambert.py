@@ -62,7 +62,7 @@ class Lambert:
 
     def coefficients(self, values: Mapping[str, npt.NDArray[np.floating[Any]]]) -> npt.NDArray[np.float32]:
         """(..., 1, 3): base_color / π, taken as 0…1."""
-        base = np.clip(np.asarray(values["base_color"], np.float32), 0, 1)
+        base: npt.NDArray[np.float32] = np.clip(np.asarray(values["base_color"], np.float32), 0, 1)
         return base[..., None, :] / np.float32(np.pi)
 
 
