@@ -124,7 +124,7 @@ class PictureFeed:
         self._moving = 0  # gestures under way
         self._until = 0.0  # single steps (wheel, keys) count as moving until then
         self._changes = Changes()
-        self._queued = self._closed = False
+        self._queued = self._closed = self._rests = False
         self._answered = self._finer_only = True
         self._revision = 0
         self._outdated = 0  # pictures of revisions before this one are stale
@@ -249,6 +249,10 @@ class PictureFeed:
     def _rest(self) -> None:
         if self._closed or self.moving:
             return
+        if self._scheduler.busy and not self._answered:
+            self._rests = True  # first let the quick picture be seen
+            return
+        self._rests = False
         shown = self.last.view if self.last is not None else None
         wanted = self.frame_view()
         coarse = shown is None or (shown.width, shown.antialias) != (wanted.width, wanted.antialias)
@@ -279,6 +283,8 @@ class PictureFeed:
         self._again()
 
     def _again(self) -> None:
+        if self._rests and self._answered:
+            self._later(0, self._rest)
         if self._changes and not self._queued and not self._closed:
             self._queued = True
             self._later(0, self._flush)

@@ -39,7 +39,6 @@ class Spin(QDoubleSpinBox):
         self.setRange(max(info.low, -_WIDEST), min(info.high, _WIDEST))
         self.setSuffix(f" {info.unit}" if info.unit else "")
         self.setKeyboardTracking(False)
-        self.setButtonSymbols(QAbstractSpinBox.ButtonSymbols.NoButtons)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setAlignment(Qt.AlignmentFlag.AlignRight)
         self.setStepType(

@@ -96,14 +96,18 @@ line 18,6 6,18""",
 """The strokes of every icon by name."""
 
 
-def icon(name: str, colour: str, on: str | None = None) -> QIcon:
-    """The icon of that name; `on` colours it while checked. Unknown names raise KeyError."""
+def icon(name: str, colour: str, on: str = "", selected: str = "") -> QIcon:
+    """The icon of that name; `on` colours it while checked, `selected` in a chosen row.
+
+    Unknown names raise KeyError.
+    """
     made = QIcon()
     faded = QColor(colour)
     faded.setAlphaF(0.35)
     for ratio in (1, 2, 3):
         made.addPixmap(_pixmap(name, QColor(colour), ratio), QIcon.Mode.Normal, QIcon.State.Off)
         made.addPixmap(_pixmap(name, QColor(on or colour), ratio), QIcon.Mode.Normal, QIcon.State.On)
+        made.addPixmap(_pixmap(name, QColor(selected or colour), ratio), QIcon.Mode.Selected)
         made.addPixmap(_pixmap(name, faded, ratio), QIcon.Mode.Disabled)
     return made
 

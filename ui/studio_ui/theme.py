@@ -81,7 +81,8 @@ QToolButton:pressed, QToolButton:checked { background: $accent; color: $on_accen
 QToolButton::menu-indicator { image: none; }
 QDockWidget { color: $dim; font-weight: 600; }
 QDockWidget::title { background: $window; padding: 6px 8px; border-bottom: 1px solid $border; }
-QTabBar::tab { background: transparent; color: $dim; padding: 5px 10px; border: none;
+QTabBar { qproperty-drawBase: 0; }
+QTabBar::tab { background: transparent; color: $dim; padding: 5px 8px; border: none;
                border-bottom: 2px solid transparent; }
 QTabBar::tab:selected { color: $text; border-bottom-color: $accent; }
 QTabBar::tab:hover { color: $text; }
@@ -99,6 +100,13 @@ QLineEdit, QSpinBox, QDoubleSpinBox, QComboBox { background: $base; border: 1px 
     selection-color: $on_accent; }
 QLineEdit:focus, QSpinBox:focus, QDoubleSpinBox:focus, QComboBox:focus { border-color: $accent; }
 QLineEdit:disabled, QSpinBox:disabled, QDoubleSpinBox:disabled, QComboBox:disabled { color: $dim; }
+QAbstractSpinBox QLineEdit, QComboBox QLineEdit { border: none; padding: 0 5px; min-height: 0; margin: 0;
+    background: transparent; }
+QSpinBox::up-button, QSpinBox::down-button, QDoubleSpinBox::up-button, QDoubleSpinBox::down-button {
+    width: 0; height: 0; border: none; }
+QCheckBox::indicator { width: 14px; height: 14px; border: 1px solid $dim; border-radius: 3px;
+    background: $base; }
+QCheckBox::indicator:checked { background: $accent; border-color: $accent; }
 QComboBox QAbstractItemView { background: $raised; border: 1px solid $border; outline: 0; }
 QPushButton { background: $raised; border: 1px solid $border; border-radius: 4px; padding: 5px 12px; }
 QPushButton:hover { border-color: $accent; }

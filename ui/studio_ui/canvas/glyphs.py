@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Container
 from dataclasses import dataclass
 
 import numpy as np
@@ -34,12 +35,14 @@ class Glyph:
     light: bool
 
 
-def glyphs(scene: Scene, view: View | None = None) -> list[Glyph]:
-    """One for every shown lamp and camera; not for a camera that is looked through."""
+def glyphs(scene: Scene, view: View | None = None, chosen: Container[NodeId] = ()) -> list[Glyph]:
+    """One for every shown lamp and for chosen cameras; not for a camera that is looked through."""
     made = []
     for node in scene.nodes.values():
         local = _lines(node)
         if local is None or not scene.shown(node.id):
+            continue
+        if isinstance(node, Camera) and node.id not in chosen:
             continue
         world = scene.world(node.id)
         anchor = np.array(world.translation)

@@ -79,7 +79,7 @@ class CanvasTools:
         found = bounds(scene, chosen) if self._mode in ("drag", "orbit", "pan") and chosen else None
         if found is not None:
             boxes = box_segments(*found)
-        self._viewport.set_guides(view, glyphs(scene, view), boxes)
+        self._viewport.set_guides(view, glyphs(scene, view, chosen), boxes)
 
     def pick(self, pointer: Pointer, deep: bool = False) -> NodeId | None:
         """What a click there means: the topmost group of what is seen, or a part of the entered one."""

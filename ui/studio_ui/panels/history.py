@@ -8,6 +8,7 @@ from PySide6.QtWidgets import QListWidget, QListWidgetItem
 
 from studio_ui.context import Context
 from studio_ui.panels.panel import Panel
+from studio_ui.theme import Theme
 
 
 class HistoryPanel(Panel):
@@ -33,12 +34,17 @@ class HistoryPanel(Panel):
         )
         self.refresh()
 
+    def set_theme(self, theme: Theme) -> None:
+        """Colours of another theme."""
+        super().set_theme(theme)
+        self.refresh()
+
     def refresh(self) -> None:
         """Show what the document remembers."""
         document = self.context.document
         labels = [step.label for step in document.history]
         with QSignalBlocker(self.list):
-            same = sum(1 for _ in iter(_common(self._shown, labels)))
+            same = len(_common(self._shown, labels))
             while self.list.count() > same:
                 self.list.takeItem(self.list.count() - 1)
             for label in labels[same:]:

@@ -104,7 +104,9 @@ class LightingPanel(Panel):
                 self.list.clear()
                 for light in lights:
                     text = f"{light.name} (off)" if light.hidden else light.name
-                    item = QListWidgetItem(icon(kind_icon(light), self.theme.text), text)
+                    item = QListWidgetItem(
+                        icon(kind_icon(light), self.theme.text, selected=self.theme.on_accent), text
+                    )
                     item.setData(256, light.id)
                     self.list.addItem(item)
         if self.light not in scene.nodes:

@@ -74,7 +74,10 @@ class OutlinerPanel(Panel):
     def set_theme(self, theme: Theme) -> None:
         """Icons of another theme."""
         super().set_theme(theme)
+        self._following = True
         self.model.set_theme(theme)
+        self._following = False
+        self._unfold()
 
     def _edited(self, before: Scene, after: Scene, changes: Changes) -> None:
         if not changes:
@@ -83,10 +86,14 @@ class OutlinerPanel(Panel):
         rebuilt = self.model.follow(after, changes)
         self._following = False
         if rebuilt:
-            with QSignalBlocker(self.tree):
-                for node in self._open:
-                    self.tree.expand(self.proxy.mapFromSource(self.model.of(node)))
-            self._selected()
+            self._unfold()
+
+    def _unfold(self) -> None:
+        """After a rebuild: what was open, what was chosen."""
+        with QSignalBlocker(self.tree):
+            for node in self._open:
+                self.tree.expand(self.proxy.mapFromSource(self.model.of(node)))
+        self._selected()
 
     def _remember(self, index: QModelIndex, is_open: bool) -> None:
         node = self.model.node(self.proxy.mapToSource(index))

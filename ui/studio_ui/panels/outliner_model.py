@@ -38,9 +38,10 @@ class OutlinerModel(QAbstractItemModel):
 
     def set_theme(self, theme: Theme) -> None:
         """Icons and colours of another theme."""
+        self.beginResetModel()
         self._theme = theme
         self._icons = {}
-        self.layoutChanged.emit()
+        self.endResetModel()
 
     def follow(self, after: Scene, changes: Changes) -> bool:
         """Take over another scene; True when the tree was rebuilt."""
@@ -178,7 +179,8 @@ class OutlinerModel(QAbstractItemModel):
     def _icon(self, name: str, *, dim: bool = False) -> QIcon:
         key = f"{name}{dim}"
         if key not in self._icons:
-            self._icons[key] = icon(name, self._theme.dim if dim else self._theme.text)
+            colour = self._theme.dim if dim else self._theme.text
+            self._icons[key] = icon(name, colour, selected=self._theme.on_accent)
         return self._icons[key]
 
 

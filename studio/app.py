@@ -1,0 +1,211 @@
+"""The composition root of the window: every object is made here once and passed along."""
+
+from __future__ import annotations
+
+import contextlib
+import faulthandler
+import sys
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, TextIO
+
+from PySide6.QtCore import QCoreApplication, QEvent, Qt, QTimer
+from PySide6.QtWidgets import QApplication
+
+from studio import samples
+from studio_core.contract import Services, ShadingBackend
+from studio_core.document import Document
+from studio_core.errors import LucarneError
+from studio_core.parallel import Workers
+from studio_core.params import build
+from studio_core.registry import PluginHost
+from studio_core.session import Session
+from studio_core.shading.pipeline import Pipeline
+from studio_core.shading.scheduler import ComputeThread, Executor
+from studio_ui.ask import Ask
+from studio_ui.bridge import Bridge
+from studio_ui.canvas.raster_viewport import RasterViewport
+from studio_ui.context import Context
+from studio_ui.editing import Editing
+from studio_ui.feed import PictureFeed, Shading
+from studio_ui.journal import Journal
+from studio_ui.main_window import MainWindow
+from studio_ui.settings import Settings, state_folder
+from studio_ui.tasks import Tasks
+
+
+class PluginShading:
+    """Pipelines of the registered backends; satisfies `studio_ui.feed.Shading`."""
+
+    def __init__(self, services: Services) -> None:
+        self._services = services
+
+    def pipeline(self, backend: str) -> Pipeline:
+        """The backend's stages and the picture they end in."""
+        from studio_core.raster import PictureStage
+
+        found: ShadingBackend = self._services.registry.get("backend", backend)
+        return Pipeline([*found.stages(self._services), PictureStage(self._services)])
+
+    def params(self, backend: str, values: Mapping[str, Any]) -> Any:
+        """The backend's parameters, checked."""
+        return build(self._services.registry.get("backend", backend).Params, values)
+
+
+@dataclass
+class Studio:
+    """A window with everything behind it. `close` ends threads; the window is to be closed before."""
+
+    window: MainWindow
+    context: Context
+    bridge: Bridge
+    workers: Workers
+    executors: tuple[Executor, ...]
+
+    def close(self) -> None:
+        """Wait for threads and let Qt delete what it has to."""
+        self.window.closing = True  # nobody is asked any more
+        self.window.shut()
+        for executor in self.executors:
+            executor.close()
+        self.bridge.close()
+        self.workers.close()
+        self.window.close()
+        self.window.deleteLater()
+        self.bridge.deleteLater()
+        QCoreApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
+
+
+def assemble(
+    *,
+    settings: Settings | None = None,
+    host: PluginHost | None = None,
+    shading: Shading | None = None,
+    compute: Executor | None = None,
+    files: Executor | None = None,
+    ask: Ask | None = None,
+    threads: int | None = None,
+) -> Studio:
+    """A window with an empty document; what is not given is the real thing. Needs a QApplication."""
+    settings = settings or Settings(state_folder())
+    host = host or PluginHost.discover()
+    workers = Workers(threads)
+    compute, files = compute or ComputeThread(), files or ComputeThread()
+    journal, document, session = Journal(), Document(), Session()
+    bridge = Bridge(lambda error: journal.problem("Something in the window", error))
+
+    def later(milliseconds: int, call: Callable[[], None]) -> None:
+        QTimer.singleShot(milliseconds, bridge, call)
+
+    editing = Editing(document, journal.problem)
+    tasks = Tasks(files, bridge.post, journal)
+    shading = shading or PluginShading(Services(workers, host))
+    feed = PictureFeed(document, session, shading, compute, bridge.post, later)
+    context = Context(document, session, editing, host, journal, tasks, feed)
+    window = MainWindow(context, RasterViewport(), settings, files, _samples(), ask)
+    for failure in host.failures:
+        journal.write(f"The plugin {failure.plugin} {failure.what}", "problem", failure.traceback)
+    _warm(context, compute, files, bridge)
+    return Studio(window, context, bridge, workers, (compute, files))
+
+
+def run_window(path: Path | None, *, read_only: bool = False) -> int:
+    """Open the window on a project (None: the sample room); the program's exit status."""
+    QApplication.setAttribute(Qt.ApplicationAttribute.AA_ShareOpenGLContexts)
+    application = QApplication.instance() or QApplication(sys.argv[:1])
+    assert isinstance(application, QApplication)
+    application.setApplicationName("Lucarne")
+    application.setDesktopFileName("lucarne")
+    settings = Settings(state_folder())
+    with _crash_log(settings.folder) as crashed:
+        studio = assemble(settings=settings)
+        before, sys.excepthook = sys.excepthook, _hook(studio.context.journal)
+        try:
+            studio.window.show()
+            if crashed:
+                studio.context.journal.write(
+                    "The program crashed last time; its report is here.", "warning", crashed
+                )
+            _first(studio, path, read_only)
+            return application.exec()
+        finally:
+            studio.close()
+            sys.excepthook = before
+
+
+def _first(studio: Studio, path: Path | None, read_only: bool) -> None:
+    """What is opened at the start, once the window is up."""
+
+    def start() -> None:
+        files = studio.window.files
+        if path is not None:
+            files.open(path, read_only=read_only)
+            return
+        with contextlib.suppress(LucarneError):
+            files.open_copy(samples.sample())
+        files.offer_unsaved()
+
+    QTimer.singleShot(0, studio.bridge, start)
+
+
+def _warm(context: Context, compute: Executor, files: Executor, bridge: Bridge) -> None:
+    """Load models and backends on the compute thread, so that panels can ask for them."""
+    host = context.host
+
+    def warmed() -> None:
+        context.warm = True
+        context.warmed.emit()
+
+    def load() -> None:
+        for kind in ("brdf", "backend"):
+            host.available(kind)
+        bridge.post(warmed)
+
+    def rest() -> None:
+        for kind in ("importer", "exporter"):
+            host.available(kind)
+
+    compute.submit(load)
+    files.submit(rest)
+
+
+def _samples() -> dict[str, Path]:
+    with contextlib.suppress(LucarneError, OSError):
+        found = sorted(samples.sample_folder().glob("*.lucarne"))
+        return {path.stem.replace("-", " ").capitalize(): path for path in found}
+    return {}
+
+
+def _hook(journal: Journal) -> Callable[..., None]:
+    """What an exception in a slot does: it is told, and the program goes on."""
+
+    def tell(kind: type[BaseException], error: BaseException, trace: object) -> None:
+        if issubclass(kind, KeyboardInterrupt):
+            QApplication.quit()
+            return
+        sys.__excepthook__(kind, error, trace)  # type: ignore[arg-type]
+        journal.problem("Something in the window", error)
+
+    return tell
+
+
+@contextlib.contextmanager
+def _crash_log(folder: Path) -> Any:
+    """Write a report when the process dies; gives what the last one wrote."""
+    file: TextIO | None = None
+    report = ""
+    path = folder / "crash.txt"
+    try:
+        with contextlib.suppress(OSError):
+            folder.mkdir(parents=True, exist_ok=True)
+            report = path.read_text("utf-8", "replace") if path.exists() else ""
+            file = path.open("w", encoding="utf-8")
+            faulthandler.enable(file)
+        yield report
+    finally:
+        if file is not None:
+            faulthandler.disable()
+            file.close()
+            with contextlib.suppress(OSError):
+                path.unlink()

@@ -1,0 +1,239 @@
+"""What the actions do to scene and view. Files and dialogs are elsewhere."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from studio_core.edits import Add, Compound, Edit, Move, Remove, Reparent, SetFields, duplicate
+from studio_core.scene.nodes import Camera, Environment, Group, NodeId, Scene, new_id
+from studio_core.scene.transform import Transform, vec3
+from studio_core.session import View
+from studio_ui.canvas import navigation
+from studio_ui.canvas.drags import dropped, is_locked, middle, named, roots, shifted, turned
+from studio_ui.canvas.projection import bounds
+from studio_ui.canvas.tools import CanvasTools
+from studio_ui.context import Context
+
+STEP = 0.05  # metres
+ANGLE = 15.0  # degrees
+_COPY_OFFSET = 0.3
+_EV_LIMIT = 16.0
+
+
+class Commands:
+    """Handlers and conditions of the actions."""
+
+    def __init__(self, context: Context, tools: CanvasTools) -> None:
+        self._context, self._tools = context, tools
+
+    def handlers(self) -> dict[str, Callable[[], object]]:
+        """By action id."""
+        made: dict[str, Callable[[], object]] = {
+            "edit.undo": self._context.editing.undo,
+            "edit.redo": self._context.editing.redo,
+            "edit.duplicate": self.duplicate,
+            "edit.delete": self.delete,
+            "edit.select_all": self.select_all,
+            "edit.select_none": lambda: self._context.session.select([]),
+            "object.drop": self.drop,
+            "object.group": self.group,
+            "object.ungroup": self.ungroup,
+            "object.hide": self.hide,
+            "object.show_all": self.show_all,
+            "object.lock": self.lock,
+            "object.turn_left": lambda: self.turn(ANGLE),
+            "object.turn_right": lambda: self.turn(-ANGLE),
+            "view.frame_selection": self.frame_selection,
+            "view.frame_all": self.frame_all,
+            "view.new_camera": self.new_camera,
+            "view.aim_camera": self.aim_camera,
+            "view.brighter": lambda: self.expose(0.5),
+            "view.darker": lambda: self.expose(-0.5),
+            "shade.again": self._context.feed.restart,
+            "shade.cancel": self._context.feed.cancel,
+        }
+        nudges = {"left": (-1, 0, 0), "right": (1, 0, 0), "away": (0, 0, 1), "near": (0, 0, -1)}
+        nudges |= {"up": (0, 1, 0), "down": (0, -1, 0)}
+        for name, way in nudges.items():
+            made[f"object.{name}"] = lambda w=way: self.nudge(*w)
+        for tool in ("select", "move", "rotate"):
+            made[f"tool.{tool}"] = lambda t=tool: self._tools.use(t)
+        for axis in navigation.AXES:
+            made[f"view.{axis}"] = lambda a=axis: self.look_from(a)
+        return made
+
+    def conditions(self) -> dict[str, Callable[[], bool]]:
+        """By name, as actions use them."""
+        document, feed = self._context.document, self._context.feed
+        return {
+            "undo": lambda: document.can_undo,
+            "redo": lambda: document.can_redo,
+            "selection": lambda: bool(self.chosen),
+            "movable": lambda: bool(roots(document.scene, self.chosen)),
+            "camera": lambda: any(isinstance(document.scene[n], Camera) for n in self.chosen),
+            "group": lambda: any(isinstance(document.scene[n], Group) for n in self.chosen),
+            "picture": lambda: feed.last is not None,
+            "computing": lambda: feed.busy,
+        }
+
+    @property
+    def chosen(self) -> tuple[NodeId, ...]:
+        """The selection, without what is gone."""
+        scene = self._context.document.scene
+        return tuple(n for n in self._context.session.selection if n in scene.nodes)
+
+    # scene
+
+    def duplicate(self) -> None:
+        """Copies beside the originals, chosen."""
+        scene = self._context.document.scene
+        nodes = tuple(n for n in self.chosen if not isinstance(scene[n], Environment))
+        if not nodes:
+            return
+        right, _ = navigation.nudge_axes(self._context.session.view)
+        found = bounds(scene, nodes)
+        wide = float(np.abs((found[1] - found[0]) @ np.abs(right))) if found is not None else 0.0
+        edit = duplicate(scene, nodes, offset=Transform(vec3(right * (wide + _COPY_OFFSET))))
+        fresh = {node.id for node in edit.nodes}
+        if self._apply(edit):
+            self._context.session.select(n.id for n in edit.nodes if n.parent not in fresh)
+
+    def delete(self) -> None:
+        """What is chosen, with what hangs under it; locked things stay."""
+        scene = self._context.document.scene
+        nodes = tuple(n for n in self.chosen if not is_locked(scene, n))
+        if nodes and self._apply(Remove(nodes, named(scene, nodes, "Delete"))):
+            self._context.session.select([])
+
+    def select_all(self) -> None:
+        """Everything at the top that is shown and not locked."""
+        scene = self._context.document.scene
+        tops = scene.children(None)
+        self._context.session.select(n.id for n in tops if not n.locked and not n.hidden)
+
+    def nudge(self, right: int, up: int, away: int) -> None:
+        """One step along the axes as they are seen."""
+        along, ahead = navigation.nudge_axes(self._context.session.view)
+        delta = STEP * (right * along + away * ahead + up * np.array([0.0, 1.0, 0.0]))
+        self._move(lambda scene, nodes: shifted(scene, nodes, delta), "Nudge")
+
+    def turn(self, degrees: float) -> None:
+        """About the vertical through the middle."""
+        self._move(lambda scene, nodes: turned(scene, nodes, degrees, middle(scene, nodes)), "Turn")
+
+    def drop(self) -> None:
+        """Stand on the floor."""
+        self._move(dropped, "Drop")
+
+    def group(self) -> None:
+        """A new group around what is chosen."""
+        scene = self._context.document.scene
+        nodes = tuple(n for n in self.chosen if not isinstance(scene[n], Environment))
+        if not nodes:
+            return
+        made = Group(id=new_id("group"), name="Group", parent=scene[nodes[0]].parent)
+        if self._apply(Compound("Group", (Add((made,)), Reparent(nodes, made.id)))):
+            self._context.session.select([made.id])
+
+    def ungroup(self) -> None:
+        """What the chosen groups hold goes up one level."""
+        scene = self._context.document.scene
+        edits: list[Edit] = []
+        freed: list[NodeId] = []
+        for node in self.chosen:
+            if isinstance(scene[node], Group):
+                inside = tuple(child.id for child in scene.children(node))
+                freed += inside
+                edits += [Reparent(inside, scene[node].parent), Remove((node,))]
+        if edits and self._apply(Compound("Ungroup", tuple(edits))):
+            self._context.session.select(freed)
+
+    def hide(self) -> None:
+        """Hide what is chosen."""
+        self._fields("Hide", self.chosen, "hidden", True)
+
+    def show_all(self) -> None:
+        """Show everything that is hidden, but switch no lamp on."""
+        scene = self._context.document.scene
+        hidden = [n.id for n in scene.nodes.values() if n.hidden and not hasattr(n, "intensity")]
+        self._fields("Show all", tuple(hidden), "hidden", False)
+
+    def lock(self) -> None:
+        """Lock what is chosen, or unlock it when all of it is locked."""
+        scene = self._context.document.scene
+        locked = all(scene[n].locked for n in self.chosen)
+        self._fields("Unlock" if locked else "Lock", self.chosen, "locked", not locked)
+
+    # view
+
+    def frame_selection(self) -> None:
+        """See all of what is chosen, else everything."""
+        self._frame(self.chosen or None)
+
+    def frame_all(self) -> None:
+        """See everything."""
+        self._frame(None)
+
+    def look_from(self, axis: str) -> None:
+        """Front, back, left, right, top or bottom."""
+        self._look(navigation.along_axis(self._context.session.view, axis))
+
+    def look_through(self, camera: NodeId) -> None:
+        """See what a camera of the scene sees."""
+        scene, view = self._context.document.scene, self._context.session.view
+        node = scene[camera]
+        if isinstance(node, Camera):
+            self._look(View.of(node, scene, view.width, view.height))
+
+    def new_camera(self) -> None:
+        """A camera that sees what is seen now."""
+        scene, view = self._context.document.scene, self._context.session.view
+        taken = {n.name for n in scene.of(Camera)}
+        name = next(n for n in ("Camera", *(f"Camera {i}" for i in range(2, 10**6))) if n not in taken)
+        made = Camera(
+            id=new_id("camera"), name=name, transform=view.transform, fov=view.fov, focus=view.focus
+        )
+        if self._apply(Add((made,), label=f"New {name}")):
+            self._context.session.select([made.id])
+
+    def aim_camera(self) -> None:
+        """Put the chosen camera where the view is."""
+        scene, view = self._context.document.scene, self._context.session.view
+        camera = next((n for n in self.chosen if isinstance(scene[n], Camera)), None)
+        if camera is None:
+            return
+        parent = scene[camera].parent
+        local = view.transform if parent is None else scene.world(parent).inverse() @ view.transform
+        fields = SetFields(camera, {"fov": view.fov, "focus": view.focus})
+        self._apply(Compound(f"Aim {scene[camera].name}", (Move({camera: local}), fields)))
+
+    def expose(self, ev: float) -> None:
+        """More or less exposure."""
+        session = self._context.session
+        session.display(exposure=float(np.clip(session.exposure + ev, -_EV_LIMIT, _EV_LIMIT)))
+
+    def _frame(self, nodes: tuple[NodeId, ...] | None) -> None:
+        found = bounds(self._context.document.scene, nodes)
+        if found is not None:
+            self._look(navigation.frame(self._context.session.view, *found))
+
+    def _look(self, view: View) -> None:
+        self._context.feed.step()
+        self._context.session.look(view)
+
+    def _fields(self, verb: str, nodes: tuple[NodeId, ...], name: str, value: bool) -> None:
+        if nodes:
+            label = named(self._context.document.scene, nodes, verb) if verb != "Show all" else verb
+            self._apply(Compound(label, tuple(SetFields(n, {name: value}) for n in nodes)))
+
+    def _move(self, how: Callable[[Scene, tuple[NodeId, ...]], dict[NodeId, Transform]], verb: str) -> None:
+        scene = self._context.document.scene
+        nodes = roots(scene, self.chosen)
+        if nodes:
+            self._context.feed.step()
+            self._apply(Move(how(scene, nodes), named(scene, nodes, verb)))
+
+    def _apply(self, edit: Edit) -> bool:
+        return self._context.editing.apply(edit)

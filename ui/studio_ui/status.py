@@ -1,0 +1,86 @@
+"""The status bar: what happens, what is under the mouse, how the picture was computed."""
+
+from __future__ import annotations
+
+import math
+
+from PySide6.QtCore import QTimer
+from PySide6.QtWidgets import QLabel, QStatusBar
+
+from studio_core.scene.nodes import Scene
+from studio_ui.canvas.viewport import Probe
+from studio_ui.feed import Freshness, Shown
+from studio_ui.journal import Entry
+
+_SHOWN_MS = 9000
+
+
+class StatusBar(QStatusBar):
+    """Labels with a place of their own, so that nothing jumps."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.setSizeGripEnabled(False)
+        self.message = QLabel()
+        self.message.setTextFormat(self.message.textFormat().PlainText)
+        self.pixel = QLabel()
+        self.backend = QLabel()
+        self.vertices = QLabel()
+        self.directions = QLabel()
+        self.time = QLabel()
+        self.error = QLabel("error: not measured")
+        self.error.setToolTip("Relative error of the picture against brute force")
+        self.vertices.setToolTip("Points that were lit, of all shading vertices")
+        self.directions.setToolTip("Directions that light came from")
+        self.time.setToolTip("From the change to this picture")
+        self.pixel.setToolTip("What is under the mouse: radiance (scene-linear red, green, blue)")
+        self.addWidget(self.message, 1)
+        for label in (self.pixel, self.backend, self.vertices, self.directions, self.time, self.error):
+            self.addPermanentWidget(label)
+        self._clear = QTimer(self)
+        self._clear.setSingleShot(True)
+        self._clear.timeout.connect(self.message.clear)
+
+    def tell(self, entry: Entry) -> None:
+        """A line of the journal, for a while."""
+        self.say(entry.text, "" if entry.level == "note" else entry.level)
+
+    def say(self, text: str, role: str = "") -> None:
+        """A message, for a while."""
+        self.message.setProperty("role", role)
+        self.message.style().unpolish(self.message)
+        self.message.style().polish(self.message)
+        self.message.setText(text)
+        self.message.setToolTip(text)
+        self._clear.start(_SHOWN_MS)
+
+    def show_backend(self, label: str) -> None:
+        """Which backend computes."""
+        self.backend.setText(label)
+
+    def show_picture(self, shown: Shown) -> None:
+        """How the picture was computed."""
+        radiance = shown.picture.radiance
+        count, lit = len(radiance.valid), int(radiance.valid.sum())
+        self.vertices.setText(f"{lit:,} of {count:,} vertices" if lit != count else f"{count:,} vertices")
+        self.directions.setText(f"{radiance.directions:,} directions")
+        self.time.setText(duration(shown.seconds))
+
+    def show_freshness(self, state: Freshness) -> None:
+        """How the picture stands to the scene."""
+        self.time.setToolTip(f"From the change to this picture ({state.value})")
+
+    def show_probe(self, probe: Probe | None, scene: Scene) -> None:
+        """What is under the mouse."""
+        if probe is None:
+            self.pixel.clear()
+            return
+        red, green, blue = probe.radiance
+        name = scene.nodes[probe.node].name if probe.node in scene.nodes else "background"
+        place = f", {probe.distance:.2f} m" if math.isfinite(probe.distance) else ""
+        self.pixel.setText(f"{name}{place}: {red:.3g} {green:.3g} {blue:.3g}")
+
+
+def duration(seconds: float) -> str:
+    """In the unit a person would use."""
+    return f"{seconds * 1000:.0f} ms" if seconds < 1 else f"{seconds:.1f} s"

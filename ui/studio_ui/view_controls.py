@@ -1,0 +1,117 @@
+"""On the toolbar: through which camera, how bright, with which view transform."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import QSignalBlocker
+from PySide6.QtWidgets import QHBoxLayout, QLabel, QWidget
+
+from studio_core.kernels.tonemap import KINDS, LABELS
+from studio_core.params import ParamInfo
+from studio_core.scene.nodes import Camera
+from studio_ui.commands import Commands
+from studio_ui.context import Context, Subscriptions
+from studio_ui.fields import Combo, NumberField
+from studio_ui.sinks import Sink
+from studio_ui.theme import GAP
+
+_EXPOSURE = ParamInfo("number", "Exposure", "How bright the picture is shown", unit="EV", low=-16, high=16)
+_FREE = "Free view"
+
+
+class _Exposure(Sink):
+    """A slider that changes how the picture is shown at once, without history."""
+
+    def __init__(self, context: Context) -> None:
+        self._session = context.session
+
+    def begin(self, name: str) -> bool:
+        return True
+
+    def preview(self, name: str, value: object) -> None:
+        self._session.display(exposure=round(float(value), 2))  # type: ignore[arg-type]
+
+    def commit(self) -> None:
+        return
+
+    def cancel(self) -> None:
+        return
+
+    def apply(self, name: str, value: object) -> None:
+        self.preview(name, value)
+
+
+class ViewControls(QWidget):
+    """Camera, exposure, view transform."""
+
+    def __init__(self, context: Context, commands: Commands) -> None:
+        super().__init__()
+        self._context, self._commands = context, commands
+        self.camera, self.transform = Combo(), Combo()
+        self.camera.setToolTip("Look through a camera of the scene")
+        self.camera.setMinimumWidth(120)
+        self.exposure = NumberField("exposure", _EXPOSURE, _Exposure(context))
+        self.exposure.setFixedWidth(230)
+        self.transform.setToolTip("How light becomes what the display shows")
+        self.transform.setMinimumWidth(150)
+        for kind in KINDS:
+            self.transform.addItem(LABELS[kind], kind)
+        self.transform.activated.connect(lambda i: context.session.display(tonemap=KINDS[i]))
+        self.camera.activated.connect(self._look)
+        layout = QHBoxLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.setSpacing(GAP)
+        for label, widget in (("", self.camera), ("EV", self.exposure), ("", self.transform)):
+            if label:
+                text = QLabel(label)
+                text.setProperty("role", "dim")
+                layout.addWidget(text)
+            layout.addWidget(widget)
+        self._known: list[tuple[str, str]] = [("", "")]
+        self._subscriptions = Subscriptions()
+        self._subscriptions.add(
+            context.document.changed.connect(lambda *_: self._cameras()),
+            context.session.changed.connect(lambda _: self._follow()),
+            context.session.displayed.connect(self._display),
+        )
+        self._cameras()
+        self._display()
+
+    def close_panel(self) -> None:
+        """Stop listening."""
+        self._subscriptions.close()
+
+    def _cameras(self) -> None:
+        found = [(camera.id, camera.name) for camera in self._context.document.scene.of(Camera)]
+        if found != self._known:
+            self._known = found
+            with QSignalBlocker(self.camera):
+                self.camera.clear()
+                self.camera.addItem(_FREE, "")
+                for node, name in found:
+                    self.camera.addItem(name, node)
+        self._follow()
+
+    def _follow(self) -> None:
+        """Which camera, if any, is where the view is."""
+        scene, view = self._context.document.scene, self._context.session.view
+        at = 0
+        for index, (node, _) in enumerate(self._known):
+            world = scene.world(node)
+            same = (world.translation, world.rotation) == (
+                view.transform.translation,
+                view.transform.rotation,
+            )
+            at = index + 1 if same else at
+        with QSignalBlocker(self.camera):
+            self.camera.setCurrentIndex(at)
+
+    def _look(self, index: int) -> None:
+        node = self.camera.itemData(index)
+        if node:
+            self._commands.look_through(node)
+
+    def _display(self) -> None:
+        session = self._context.session
+        self.exposure.show_value(session.exposure)
+        with QSignalBlocker(self.transform):
+            self.transform.setCurrentIndex(KINDS.index(session.tonemap))
