@@ -115,7 +115,7 @@ def compose(
 ) -> Picture:
     """Linear (H, W, 3) with the environment behind where it is to be seen."""
     surfaces, view = radiance.surfaces, hits.view
-    samples = _Compositor(scene, radiance, view, table, workers, job)(hits, EVERY)
+    samples = Compositor(scene, radiance, view, table, workers, job)(hits, EVERY)
     n2 = hits.samples**2
     shape = (view.height, view.width)
     linear = samples.reshape(*shape, n2, 3).mean(axis=2, dtype=np.float32)
@@ -127,7 +127,7 @@ def compose(
     return Picture(radiance, linear, coverage, node, distance)
 
 
-class _Compositor:
+class Compositor:
     """Radiance of samples; what lies behind transparent surfaces is mixed in by opacity."""
 
     def __init__(
@@ -145,7 +145,7 @@ class _Compositor:
         self.surfaces = radiance.surfaces
         self.terms = radiance.combined(lights).reshape(-1, TERMS * 3)
         self.table = table
-        self.texels = _texels_per_metre(self.surfaces, table)
+        self.texels = texels_per_metre(self.surfaces, table)
         self.pinhole = pinhole(view)
         self.pixel_angle = float(2 * self.pinhole[3] / (view.height * view.antialias))
         self.workers, self.job = workers, job
@@ -202,7 +202,8 @@ class _Compositor:
         self.workers.run(len(hits.face), CHUNK, look, self.job)
 
 
-def _texels_per_metre(surfaces: Surfaces, table: Coefficients) -> F32:
+def texels_per_metre(surfaces: Surfaces, table: Coefficients) -> F32:
+    """(F,) texels of the finest level along a metre of each face; 1 where nothing is textured."""
     mesh = surfaces.mesh
     if not (table.size[:, 0] > 1).any() or not len(mesh.faces):
         return np.ones(max(len(mesh.faces), 1), np.float32)

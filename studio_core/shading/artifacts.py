@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias, Union
 
 import numpy as np
 import numpy.typing as npt
@@ -27,6 +27,22 @@ F32 = npt.NDArray[np.float32]
 
 
 @dataclass(frozen=True)
+class ChosenPoints:
+    """Points that light is summed at: what a `WorldMesh` says of its vertices, for points of our own.
+
+    Positions (P, 3) are relative to `origin`; normals and geometric (P, 3) unit; inset (P, 3) moves the
+    start of rays; material (P,) is a row of `Shapes`.
+    """
+
+    origin: npt.NDArray[np.float64]
+    positions: F32
+    normals: F32
+    geometric: F32
+    inset: F32
+    material: npt.NDArray[np.int32]
+
+
+@dataclass(frozen=True)
 class Surfaces:
     """What is lit: the shading meshes of all shown objects in the world.
 
@@ -39,6 +55,9 @@ class Surfaces:
     mesh: WorldMesh
     opacity: F32
     budget: int
+
+
+ShadingPoints: TypeAlias = Union["WorldMesh", ChosenPoints]
 
 
 @dataclass(frozen=True)
@@ -182,12 +201,14 @@ class Picture:
 __all__ = [
     "TERMS",
     "Casters",
+    "ChosenPoints",
     "Hits",
     "Lamp",
     "LayerRadiance",
     "Lighting",
     "Picture",
     "Radiance",
+    "ShadingPoints",
     "Shapes",
     "Surfaces",
 ]

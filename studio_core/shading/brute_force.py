@@ -13,16 +13,16 @@ from studio_core.arrays import content_hash
 from studio_core.kernels.directions import DirectionList, DirectionSet, direction_set
 from studio_core.kernels.light_tree import LightTree
 from studio_core.kernels.radiance import BATCH, environment_terms, lamp_terms
+from studio_core.kernels.raycast import RayCaster
 from studio_core.kernels.visibility import occlusion_rays, trace_visibility
 from studio_core.parallel import Workers
 from studio_core.shading.artifacts import (
     TERMS,
-    Casters,
     Lamp,
     LayerRadiance,
     Lighting,
+    ShadingPoints,
     Shapes,
-    Surfaces,
 )
 from studio_core.shading.job import Job
 from studio_core.shading.lamps import lamp_light, lamp_targets
@@ -44,15 +44,15 @@ class VisibilityBits:
     bits[p, w] bit b: direction 64·w + b leaves vertex p unoccluded and above its shading horizon.
     """
 
-    def __init__(self, surfaces: Surfaces, casters: Casters, workers: Workers) -> None:
-        self._surfaces, self._casters, self._workers = surfaces, casters, workers
+    def __init__(self, mesh: ShadingPoints, shadow: RayCaster, workers: Workers) -> None:
+        self._mesh, self._shadow, self._workers = mesh, shadow, workers
         self._kept: dict[str, tuple[npt.NDArray[np.uint64], npt.NDArray[np.bool_]]] = {}
         self.rays = 0
         self.skipped = 0
 
     def of(self, points: Points, directions: Directions, job: Job) -> npt.NDArray[np.uint64]:
         """(len(points), S/64) words; kept unless all vertices would need over 1 GiB."""
-        count, words = len(self._surfaces.mesh.positions), directions.size // 64
+        count, words = len(self._mesh.positions), directions.size // 64
         if count * words * 8 > BITS_LIMIT:
             return self._trace(points, directions, job)
         key = _key(directions)
@@ -69,9 +69,9 @@ class VisibilityBits:
         return wanted
 
     def _trace(self, points: Points, directions: Directions, job: Job) -> npt.NDArray[np.uint64]:
-        mesh = self._surfaces.mesh
+        mesh = self._mesh
         found = trace_visibility(
-            self._casters.shadow,
+            self._shadow,
             mesh.positions[points] + mesh.origin,
             mesh.normals[points],
             directions,
@@ -91,9 +91,9 @@ def _key(directions: Directions) -> str:
     return str(directions.k)
 
 
-def blank_layer(surfaces: Surfaces) -> LayerRadiance:
+def blank_layer(mesh: ShadingPoints) -> LayerRadiance:
     """A layer without light."""
-    count = len(surfaces.mesh.positions)
+    count = len(mesh.positions)
     return LayerRadiance(np.zeros((count, TERMS, 3), np.float32), np.zeros((count, 3), np.float32))
 
 
@@ -119,7 +119,7 @@ def split_light(tree: LightTree, level: int) -> list[tuple[Directions, F32]]:
 
 
 def environment_layer(
-    surfaces: Surfaces,
+    mesh: ShadingPoints,
     shapes: Shapes,
     lighting: Lighting,
     visibility: VisibilityBits,
@@ -130,7 +130,7 @@ def environment_layer(
     job: Job,
 ) -> LayerRadiance:
     """The environment's layer at unit gain for `points`, over 2^level directions and their parts."""
-    layer, mesh = blank_layer(surfaces), surfaces.mesh
+    layer = blank_layer(mesh)
     if lighting.tree is None or not len(points):
         return layer
     local_eye = (eye - mesh.origin).astype(np.float32)
@@ -173,9 +173,9 @@ def environment_layer(
 
 
 def lamp_layer(
-    surfaces: Surfaces,
+    mesh: ShadingPoints,
     shapes: Shapes,
-    casters: Casters,
+    shadow: RayCaster,
     lamp: Lamp,
     eye: npt.NDArray[np.float64],
     points: Points,
@@ -184,7 +184,7 @@ def lamp_layer(
     job: Job,
 ) -> LayerRadiance:
     """One lamp's layer at unit gain for `points`, by traced shadow rays to `samples` places of the lamp."""
-    layer, mesh = blank_layer(surfaces), surfaces.mesh
+    layer = blank_layer(mesh)
     targets = lamp_targets(lamp, min(samples, BATCH))
     local_eye = (eye - mesh.origin).astype(np.float32)
     step = max(1, (1 << 20) // len(targets))
@@ -194,7 +194,7 @@ def lamp_layer(
         positions = mesh.positions[block] + mesh.origin
         towards, weight = lamp_light(lamp, targets, positions)
         seen = occlusion_rays(
-            casters.shadow,
+            shadow,
             positions,
             mesh.normals[block],
             targets,
@@ -222,7 +222,7 @@ def lamp_layer(
     return layer
 
 
-def all_points(surfaces: Surfaces, mask: npt.NDArray[np.bool_] | None = None) -> Points:
-    """Indices of the vertices of `mask`, or of all."""
-    count = len(surfaces.mesh.positions)
+def all_points(mesh: ShadingPoints, mask: npt.NDArray[np.bool_] | None = None) -> Points:
+    """Indices of the points of `mask`, or of all."""
+    count = len(mesh.positions)
     return np.flatnonzero(mask).astype(np.int64) if mask is not None else np.arange(count, dtype=np.int64)

@@ -77,6 +77,9 @@ class Scheduler:
 
     `shown(frame, artifact, final)` gives partial and final results, never one older than the last shown;
     `failed(frame, error)`; `progress(job)`; `idle()` when nothing is left to do. All on the owner's thread.
+
+    `spare(pipeline, frame, job)` is run when a frame is finished and nothing waits, such as the error
+    meter; its result comes as `measured(frame, result)`. Any request cancels it.
     """
 
     def __init__(
@@ -85,10 +88,12 @@ class Scheduler:
         executor: Executor,
         post: Callable[[Callable[[], None]], None] = lambda call: call(),
         label: str = "Shading",
+        spare: Callable[[Pipeline, Frame, Job], Any] | None = None,
     ) -> None:
         self.shown: Signal[[Frame, Any, bool]] = Signal()
         self.failed: Signal[[Frame, Exception]] = Signal()
         self.progress: Signal[[Job]] = Signal()
+        self.measured: Signal[[Frame, Any]] = Signal()
         self.idle: Signal[[]] = Signal()
         self.pipeline = pipeline
         self.label = label
@@ -101,6 +106,8 @@ class Scheduler:
         self._job: Job | None = None
         self._waiting: tuple[Frame, Changes] | None = None
         self._closed = False
+        self._spare = spare
+        self._spare_job: Job | None = None
 
     @property
     def busy(self) -> bool:
@@ -123,7 +130,7 @@ class Scheduler:
         self._waiting = (frame, changes)
         if self._job is None:
             self._start()
-        elif self.pipeline.dirties(changes, self.pipeline.current):
+        elif self._job is self._spare_job or self.pipeline.dirties(changes, self.pipeline.current):
             self._job.cancel()
         return self._revision
 
@@ -165,17 +172,46 @@ class Scheduler:
 
     def _finish(self, frame: Frame, job: Job, result: Any, error: Exception | None) -> None:
         self._job = None
+        done = False
         if isinstance(error, Cancelled):
             self.cancelled_jobs += 1
         elif error is not None:
             self.failed.emit(frame, error)
         else:
+            done = True
             self.finished_jobs += 1
             self._show(frame, result, True)
         if self._waiting is not None and not self._closed:
             self._start()
+        elif done and self._spare is not None and self._job is None and not self._closed:
+            self._measure(self._spare, frame)
         elif self._job is None:
             self.idle.emit()
+
+    def _measure(self, spare: Callable[[Pipeline, Frame, Job], Any], frame: Frame) -> None:
+        job = Job("Measuring the error", on_progress=lambda j: self._post(lambda: self.progress.emit(j)))
+        self._job = self._spare_job = job
+
+        def run() -> None:
+            result, error = None, None
+            try:
+                result = spare(self.pipeline, frame, job)
+            except Exception as caught:
+                error = caught
+            self._post(lambda: finish(result, error))
+
+        def finish(result: Any, error: Exception | None) -> None:
+            self._job = self._spare_job = None
+            if error is not None and not isinstance(error, Cancelled):
+                self.failed.emit(frame, error)
+            elif error is None and self._waiting is None and not self._closed:
+                self.measured.emit(frame, result)
+            if self._waiting is not None and not self._closed:
+                self._start()
+            elif self._job is None:
+                self.idle.emit()
+
+        self._executor.submit(run)
 
     def _show(self, frame: Frame, artifact: Any, final: bool) -> None:
         if frame.revision >= self._last_shown and not self._closed:

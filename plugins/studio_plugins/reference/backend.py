@@ -56,7 +56,7 @@ class VisibilityStage:
 
     def run(self, frame: Frame, inputs: Inputs, job: Job) -> VisibilityBits:
         """Empty; it fills as light is summed."""
-        return VisibilityBits(inputs[Surfaces], inputs[Casters], self._workers)
+        return VisibilityBits(inputs[Surfaces].mesh, inputs[Casters].shadow, self._workers)
 
 
 class ReferenceStage:
@@ -74,12 +74,20 @@ class ReferenceStage:
         surfaces, lighting, params = inputs[Surfaces], inputs[Lighting], frame.params
         hits, shapes, casters = inputs[Hits], inputs[Shapes], inputs[Casters]
         seen = None if params.everywhere else visible_vertices(surfaces, hits)
-        points = all_points(surfaces, seen)
+        points = all_points(surfaces.mesh, seen)
         eye = np.asarray(frame.view.transform.translation, np.float64)
         layers: dict[str, LayerRadiance] = {}
         for lamp in lighting.lamps:
             layers[lamp.node] = lamp_layer(
-                surfaces, shapes, casters, lamp, eye, points, params.lamp_samples, self._workers, job
+                surfaces.mesh,
+                shapes,
+                casters.shadow,
+                lamp,
+                eye,
+                points,
+                params.lamp_samples,
+                self._workers,
+                job,
             )
         valid = np.zeros(len(surfaces.mesh.positions), np.bool_)
         valid[points] = True
@@ -89,7 +97,7 @@ class ReferenceStage:
         for level in levels:
             if lighting.environment is not None:
                 layers[lighting.environment.id] = environment_layer(
-                    surfaces,
+                    surfaces.mesh,
                     shapes,
                     lighting,
                     inputs[VisibilityBits],

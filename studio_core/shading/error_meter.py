@@ -1,0 +1,252 @@
+"""How wrong is what is on the screen: brute force at a random few places, compared with what is shown.
+
+Two errors, both relative RMSE of linear radiance: of the *picture* (at random samples of it, where the
+true surface point is lit by brute force: what vertices, interpolation and the backend do together) and of
+the *vertices* (at random shown vertices: what the backend does alone).
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+import numpy.typing as npt
+
+from studio_core.contract import Services
+from studio_core.kernels.compose import shade_samples
+from studio_core.raster import Coefficients, CoefficientTable, Compositor, texels_per_metre
+from studio_core.scene.nodes import Light, NodeId
+from studio_core.scene.shading_mesh import NO_BACK
+from studio_core.shading.artifacts import (
+    TERMS,
+    Casters,
+    ChosenPoints,
+    Hits,
+    LayerRadiance,
+    Lighting,
+    Radiance,
+    ShadingPoints,
+    Shapes,
+    Surfaces,
+)
+from studio_core.shading.brute_force import VisibilityBits, all_points, environment_layer, lamp_layer
+from studio_core.shading.frame import Frame
+from studio_core.shading.job import Job
+from studio_core.shading.pipeline import Pipeline
+from studio_core.shading.stages import pinhole
+
+F32 = npt.NDArray[np.float32]
+F64 = npt.NDArray[np.float64]
+LEVEL = 15
+LAMP_SAMPLES = 256
+RESAMPLINGS = 200
+
+
+@dataclass(frozen=True)
+class Error:
+    """sqrt(mean((shown − true)²)) / mean(true), its standard error, and how many places were looked at."""
+
+    relative_rmse: float
+    uncertainty: float
+    places: int
+
+    def __str__(self) -> str:
+        return f"{100 * self.relative_rmse:.1f} ± {100 * self.uncertainty:.1f} %"
+
+
+@dataclass(frozen=True)
+class MeasuredError:
+    """Errors of a picture and of its vertices, in all and by light layer."""
+
+    picture: Error
+    vertices: Error
+    layers: Mapping[NodeId, Error] = field(default_factory=dict)
+
+    def as_dict(self) -> dict[str, object]:
+        """For --json."""
+        return dataclasses.asdict(self)
+
+
+def compare(shown: npt.ArrayLike, true: npt.ArrayLike, seed: int = 0) -> Error:
+    """The error of (N, 3) radiance; its standard error by bootstrap over the places."""
+    a, b = np.asarray(shown, np.float64), np.asarray(true, np.float64)
+    if not len(b) or not b.any():
+        return Error(0.0, 0.0, len(b))
+    squares, means = ((a - b) ** 2).mean(axis=1), b.mean(axis=1)
+    drawn = np.random.default_rng(seed).integers(0, len(b), (RESAMPLINGS, len(b)))
+    again = np.sqrt(squares[drawn].mean(axis=1)) / np.maximum(means[drawn].mean(axis=1), 1e-30)
+    return Error(float(np.sqrt(squares.mean()) / means.mean()), float(again.std()), len(b))
+
+
+class ErrorMeter:
+    """Measures what a pipeline last made."""
+
+    def __init__(self, services: Services, places: int = 256) -> None:
+        self._workers = services.workers
+        self._places = places
+        self._coefficients = CoefficientTable(services.registry)
+
+    def __call__(self, pipeline: Pipeline, frame: Frame, job: Job) -> MeasuredError | None:
+        """Errors of the pipeline's radiance for `frame`; None where nothing opaque is seen."""
+        radiance, hits = pipeline.artifact(Radiance), pipeline.artifact(Hits)
+        shapes, lighting = pipeline.artifact(Shapes), pipeline.artifact(Lighting)
+        casters = pipeline.artifact(Casters)
+        if radiance is None or hits is None or shapes is None or lighting is None or casters is None:
+            return None
+        rng = np.random.default_rng(frame.revision)
+        surfaces, mesh = radiance.surfaces, radiance.surfaces.mesh
+        hit = np.flatnonzero(hits.face >= 0)
+        candidates = hit[surfaces.opacity[mesh.face_material[hits.face[hit]]] >= 1]
+        if not len(candidates):
+            return None
+        chosen = np.sort(rng.choice(candidates, min(self._places, len(candidates)), replace=False))
+        table = self._coefficients(frame.scene, surfaces)
+        seen = _some(hits, chosen)
+        points, uvs = surface_points(surfaces, seen, frame)
+        truth = self._brute(points, shapes, lighting, casters, frame, job)
+        shown_layers, true_layers = {}, {}
+        for layer in radiance.layers:
+            one = dataclasses.replace(radiance, layers={layer: radiance.layers[layer]})
+            drawn = Compositor(frame.scene, one, hits.view, table, self._workers, job)(seen, chosen)
+            shown_layers[layer] = drawn
+            lit = dataclasses.replace(radiance, layers={layer: truth[layer]})
+            true_layers[layer] = _lit(frame, lit, seen, chosen, uvs, table)
+        shown, true = sum(shown_layers.values()), sum(true_layers.values())
+        by_layer = {k: compare(shown_layers[k], true_layers[k]) for k in shown_layers}
+        vertices = self._vertices(radiance, shapes, lighting, casters, frame, table, rng, job)
+        return MeasuredError(compare(shown, true), vertices, by_layer)
+
+    def _vertices(
+        self,
+        radiance: Radiance,
+        shapes: Shapes,
+        lighting: Lighting,
+        casters: Casters,
+        frame: Frame,
+        table: Coefficients,
+        rng: np.random.Generator,
+        job: Job,
+    ) -> Error:
+        mesh = radiance.surfaces.mesh
+        valid = np.flatnonzero(radiance.valid)
+        some = np.sort(rng.choice(valid, min(self._places, len(valid)), replace=False))
+        points = ChosenPoints(
+            mesh.origin,
+            mesh.positions[some],
+            mesh.normals[some],
+            mesh.geometric[some],
+            mesh.inset[some],
+            mesh.material[some],
+        )
+        truth = self._brute(points, shapes, lighting, casters, frame, job)
+        lights = _lights(frame)
+        first = table.table[table.first[mesh.material[some], 0]].reshape(-1, TERMS, 3)
+        shown = (radiance.combined(lights)[some] * first).sum(axis=1)
+        exact = dataclasses.replace(radiance, layers=truth, valid=np.ones(len(some), np.bool_))
+        return compare(shown, (exact.combined(lights) * first).sum(axis=1))
+
+    def _brute(
+        self,
+        points: ShadingPoints,
+        shapes: Shapes,
+        lighting: Lighting,
+        casters: Casters,
+        frame: Frame,
+        job: Job,
+    ) -> dict[NodeId, LayerRadiance]:
+        every, eye = all_points(points), np.asarray(frame.view.transform.translation, np.float64)
+        made = {
+            lamp.node: lamp_layer(
+                points, shapes, casters.shadow, lamp, eye, every, LAMP_SAMPLES, self._workers, job
+            )
+            for lamp in lighting.lamps
+        }
+        if lighting.environment is not None:
+            bits = VisibilityBits(points, casters.shadow, self._workers)
+            made[lighting.environment.id] = environment_layer(
+                points, shapes, lighting, bits, eye, every, LEVEL, self._workers, job
+            )
+        return made
+
+
+def surface_points(surfaces: Surfaces, hits: Hits, frame: Frame) -> tuple[ChosenPoints, F32]:
+    """The true surface points of hits, with interpolated normals, and their uvs (N, 2)."""
+    mesh = surfaces.mesh
+    corners = mesh.faces[hits.face]
+    place = mesh.positions[corners].astype(np.float64)
+    face_normal = np.cross(place[:, 1] - place[:, 0], place[:, 2] - place[:, 0])
+    eye = np.asarray(frame.view.transform.translation, np.float64) - mesh.origin
+    behind = ((eye - place[:, 0]) * face_normal).sum(axis=1) < 0
+    back = mesh.back_faces[hits.face]
+    turned = behind & (back[:, 0] != NO_BACK)
+    corners = np.where(turned[:, None], back, corners)
+    face_normal = np.where(turned[:, None], -face_normal, face_normal)
+    weights = np.stack([1 - hits.u - hits.v, hits.u, hits.v], axis=1).astype(np.float64)
+    normals = np.einsum("nk,nkc->nc", weights, mesh.normals[corners].astype(np.float64))
+    points = ChosenPoints(
+        mesh.origin,
+        np.einsum("nk,nkc->nc", weights, place).astype(np.float32),
+        _unit(normals),
+        _unit(face_normal),
+        np.zeros((len(corners), 3), np.float32),
+        mesh.material[corners[:, 0]],
+    )
+    return points, np.einsum("nk,nkc->nc", weights, mesh.uvs[corners]).astype(np.float32)
+
+
+def _unit(vectors: F64) -> F32:
+    length = np.linalg.norm(vectors, axis=1, keepdims=True)
+    made: F32 = (vectors / np.maximum(length, 1e-30)).astype(np.float32)
+    return made
+
+
+def _some(hits: Hits, chosen: npt.NDArray[np.int64]) -> Hits:
+    uvt = (hits.u[chosen], hits.v[chosen], hits.distance[chosen])
+    return Hits(hits.view, hits.samples, hits.face[chosen], *uvt)
+
+
+def _lights(frame: Frame) -> dict[NodeId, Light]:
+    return {light.id: light for light in frame.scene.of(Light) if frame.scene.shown(light.id)}
+
+
+def _lit(
+    frame: Frame,
+    radiance: Radiance,
+    hits: Hits,
+    samples: npt.NDArray[np.int64],
+    uvs: F32,
+    table: Coefficients,
+) -> F32:
+    """(N, 3) radiance of hits whose own light sums are `radiance.layers`: each hit its own vertex."""
+    count, mesh = len(hits.face), radiance.surfaces.mesh
+    own = dataclasses.replace(radiance, valid=np.ones(count, np.bool_))
+    out = np.zeros((count, 3), np.float32)
+    corner = np.repeat(np.arange(count, dtype=np.uint32)[:, None], 3, axis=1)
+    view = hits.view
+    lens = pinhole(view)
+    shade_samples(
+        0,
+        count,
+        np.arange(count, dtype=np.int32),
+        np.zeros(count, np.float32),
+        np.zeros(count, np.float32),
+        hits.distance,
+        samples,
+        lens,
+        corner,
+        np.full_like(corner, NO_BACK),
+        mesh.geometric[mesh.faces[hits.face, 0]],
+        mesh.face_material[hits.face],
+        uvs,
+        texels_per_metre(radiance.surfaces, table)[hits.face],
+        own.combined(_lights(frame)).reshape(count, -1),
+        table.table,
+        table.first,
+        table.size,
+        table.uv_scale,
+        float(2 * lens[3] / (view.height * view.antialias)),
+        out,
+    )
+    return out

@@ -1,0 +1,107 @@
+"""The error meter against errors that are known."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from studio_core.contract import Services
+from studio_core.raster import PictureStage
+from studio_core.scene.diff import Changes
+from studio_core.scene.nodes import Environment, PointLamp, Scene
+from studio_core.scene.transform import Transform
+from studio_core.shading.artifacts import Picture, Radiance
+from studio_core.shading.error_meter import ErrorMeter, compare
+from studio_core.shading.frame import Frame
+from studio_core.shading.job import Job
+from studio_core.shading.offline import backend_params, scene_view
+from studio_core.shading.pipeline import Pipeline
+
+
+@pytest.fixture(scope="module")
+def services(host, workers):
+    return Services(workers, host)
+
+
+def measured(scene, services, host, *, places=300, **values):
+    backend = host.get("backend", "reference")
+    pipeline = Pipeline([*backend.stages(services), PictureStage(services)])
+    view = dataclasses.replace(scene_view(scene, None, 64, 36), antialias=1)
+    params = backend_params(backend, {"directions": "32768", "vertices": 1500, **values})
+    frame = Frame(scene, view, params, 1)
+    made = pipeline.update(frame, Changes(), Job("shade"))
+    return ErrorMeter(services, places)(pipeline, frame, Job("measure")), made, pipeline, frame
+
+
+@given(st.floats(0.1, 10), st.floats(-0.5, 0.5), st.integers(1, 50))
+def test_a_constant_factor_is_its_own_error(level, wrong, count):
+    true = np.full((count, 3), level)
+    assert compare(true * (1 + wrong), true).relative_rmse == pytest.approx(abs(wrong), abs=1e-12)
+
+
+def test_the_stated_uncertainty_covers_the_scatter():
+    rng = np.random.default_rng(0)
+    errors = []
+    for trial in range(60):
+        true = rng.uniform(0.5, 1.5, (200, 3))
+        errors.append(compare(true + rng.normal(0, 0.1, true.shape), true, trial))
+    scatter = np.std([e.relative_rmse for e in errors])
+    assert 0.5 * scatter < np.mean([e.uncertainty for e in errors]) < 2 * scatter
+
+
+def test_nothing_to_compare_is_no_error():
+    assert compare(np.zeros((0, 3)), np.zeros((0, 3))).relative_rmse == 0
+
+
+def test_brute_force_has_no_error_at_its_vertices(services, host, little_scene):
+    meter, _, _, _ = measured(little_scene(), services, host)
+    assert meter.vertices.relative_rmse < 1e-5
+    assert 0 < meter.picture.relative_rmse < 0.5
+
+
+def test_coarse_directions_and_coarse_meshes_show(services, host, little_scene):
+    scene = little_scene()
+    fine, _, _, _ = measured(scene, services, host)
+    few, _, _, _ = measured(scene, services, host, directions="1024")
+    many, _, _, _ = measured(scene, services, host, vertices=20_000)
+    assert few.vertices.relative_rmse > 20 * fine.vertices.relative_rmse
+    assert many.picture.relative_rmse < fine.picture.relative_rmse
+
+
+def test_the_estimate_meets_the_error_of_all_pixels(services, host, little_scene):
+    scene = little_scene()
+    some, _, _, _ = measured(scene, services, host, places=400)
+    every, made, _, _ = measured(scene, services, host, places=10**9)
+    assert isinstance(made, Picture)
+    assert every.picture.places == int((made.node >= 0).sum())
+    assert abs(some.picture.relative_rmse - every.picture.relative_rmse) < 4 * some.picture.uncertainty + 1e-4
+
+
+def test_every_light_layer_has_its_error(services, host, little_scene):
+    lamp = PointLamp(id="lamp", name="Lamp", transform=Transform((1, 2, 1)), intensity=3.0)
+    scene = little_scene().with_nodes(lamp)
+    meter, _, pipeline, _ = measured(scene, services, host)
+    assert set(meter.layers) == set(pipeline.artifact(Radiance).layers)
+    assert "lamp" in meter.layers
+    assert all(np.isfinite(e.relative_rmse) for e in meter.layers.values())
+
+
+def test_a_wrong_picture_is_seen_as_wrong(services, host, little_scene):
+    scene = little_scene()
+    _, _, pipeline, frame = measured(scene, services, host)
+    radiance = pipeline.artifact(Radiance)
+    environment = next(scene.of(Environment))
+    layer = radiance.layers[environment.id]
+    layer.terms[...] *= np.float32(1.5)
+    meter = ErrorMeter(services, 300)(pipeline, frame, Job("measure"))
+    assert meter.vertices.relative_rmse == pytest.approx(0.5, abs=0.1)
+
+
+def test_an_empty_picture_has_no_error_to_measure(services, host, little_scene):
+    scene = Scene()
+    meter, _, _, _ = measured(scene, services, host)
+    assert meter is None
