@@ -104,13 +104,23 @@ def picture(width: float, height: float) -> list[Part]:
     for x in (-1, 1):
         upright = rounded_box((bar - 0.001, height - 2 * bar + 0.004, deep - 0.001), 0.003, (1, 3, 1), 1)
         rods.append(upright.moved(x * (width - bar) / 2, height / 2, deep / 2))
-    sheet = plane(width - 2 * bar, height - 2 * bar, (10, 8))
-    sheet = replace(sheet, uvs=sheet.uvs / np.array([width - 2 * bar, height - 2 * bar]))
+    sheet = _denser_at_its_edges(plane(width - 2 * bar, height - 2 * bar, (14, 12)))
     sheet = sheet.turned((1, 0, 0), 90).moved(y=height / 2, z=0.012)
     return [
         Part("Frame", joined(*rods), ("oak",)),
         Part("Print", sheet, ("print",), textured=True),
     ]
+
+
+def _denser_at_its_edges(sheet: Mesh) -> Mesh:
+    """A plane whose lines crowd towards the rim, where a frame's shadow lies; uvs span it once."""
+    half = np.array(sheet.positions).max(axis=0)[[0, 2]]
+    t = np.array(sheet.positions)[:, [0, 2]] / half
+    t = np.sign(t) * (1 - (1 - np.abs(t)) ** 2)
+    positions = np.array(sheet.positions)
+    positions[:, [0, 2]] = t * half
+    uvs = np.stack([(1 + t[:, 0]) / 2, (1 - t[:, 1]) / 2], axis=1)
+    return replace(sheet, positions=positions, uvs=uvs)
 
 
 def rug(width: float, depth: float) -> Part:
