@@ -5,22 +5,25 @@ from __future__ import annotations
 import argparse
 import dataclasses
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
+from studio_core.arrays import frozen_map
 from studio_core.contract import ImportedModel, Registry
 from studio_core.edits import Add
-from studio_core.errors import InputError
-from studio_core.params import check, param_infos, parse
+from studio_core.errors import InputError, LucarneError
+from studio_core.params import ParamInfo, Value, check, param_infos, parse
 from studio_core.scene.geometry import Geometry
 from studio_core.scene.nodes import Camera, Environment, Material, MeshObject, Scene, new_id
 from studio_core.scene.transform import Transform, axis_angle, looking
 from studio_core.session import View
 from studio_core.shading.offline import scene_view
 
+FARTHEST = 1e6  # metres from the middle of the world
+SMALLEST, LARGEST = 1e-6, 1e6  # scale
 UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254}
 
 
@@ -35,27 +38,36 @@ class MeshRequest:
     def parse(cls, text: str) -> MeshRequest:
         """From the command line's text; a file may have @ in its name as long as numbers follow the last."""
         path, at, numbers = text.rpartition("@")
-        if not at:
+        if not at or Path(text).is_file():
             return cls(Path(text), Transform())
-        parts = _numbers("--mesh", numbers)
+        parts = _numbers("--mesh", text, numbers)
         if not 3 <= len(parts) <= 5:
             raise InputError(f"--mesh {text!r}: after @ come x,y,z[,degrees[,scale]]")
         degrees = parts[3] if len(parts) > 3 else 0.0
         scale = parts[4] if len(parts) > 4 else 1.0
-        if scale <= 0:
-            raise InputError(f"--mesh {text!r}: the scale must be positive")
         place = (parts[0], parts[1], parts[2])
+        if not SMALLEST <= scale <= LARGEST:
+            raise InputError(f"--mesh {text!r}: expected a scale from {SMALLEST:g} to {LARGEST:g}")
+        _check_place("--mesh", text, place)
         return cls(Path(path), Transform(place, axis_angle((0, 1, 0), degrees), scale))
 
 
-def _numbers(option: str, text: str) -> list[float]:
+def _numbers(option: str, text: str, numbers: str) -> list[float]:
+    """The numbers of a part of an option's text."""
     try:
-        parts = [float(part) for part in text.split(",")]
+        parts = [float(part) for part in numbers.split(",")]
     except ValueError:
-        raise InputError(f"{option} {text!r}: expected numbers separated by commas") from None
+        raise InputError(
+            f"{option} {text!r}: expected numbers separated by commas, not {numbers!r}"
+        ) from None
     if not all(math.isfinite(part) for part in parts):
-        raise InputError(f"{option} {text!r}: expected finite numbers")
+        raise InputError(f"{option} {text!r}: expected finite numbers, not {numbers!r}")
     return parts
+
+
+def _check_place(option: str, text: str, place: Sequence[float]) -> None:
+    if max(map(abs, place)) > FARTHEST:
+        raise InputError(f"{option} {text!r}: expected places within {FARTHEST:g} metres")
 
 
 def parse_camera(text: str) -> tuple[Transform, float, float]:
@@ -65,11 +77,12 @@ def parse_camera(text: str) -> tuple[Transform, float, float]:
         name, _, numbers = part.partition("=")
         if name not in ("from", "to", "fov"):
             raise InputError(f"--camera {text!r}: write from=x,y,z:to=x,y,z:fov=degrees")
-        given[name] = _numbers("--camera", numbers)
+        given[name] = _numbers("--camera", text, numbers)
     eye, target, fov = given.get("from", []), given.get("to", []), given.get("fov", [45.0])
     if len(eye) != 3 or len(target) != 3 or len(fov) != 1:
         raise InputError(f"--camera {text!r}: write from=x,y,z:to=x,y,z:fov=degrees")
-    check("fov", param_infos(Camera)["fov"], fov[0])
+    _check_place("--camera", text, (*eye, *target))
+    check("--camera fov", param_infos(Camera)["fov"], fov[0])
     try:
         transform = looking(eye, target)
     except ValueError as error:
@@ -104,19 +117,20 @@ def floor(size: float) -> tuple[MeshObject, Material]:
 
 
 def set_material(scene: Scene, text: str, registry: Registry) -> Scene:
-    """The scene after NODE=KIND:key=value,…; the named node and all under it get the new material."""
-    name, _, rest = text.partition("=")
+    """The scene after NODE=KIND:key=value,…; the named node and all under it get the new material.
+
+    Materials that nothing uses after that are left out.
+    """
+    name, equals, rest = text.partition("=")
     kind, _, settings = rest.partition(":")
-    brdf = registry.brdf(kind)
-    infos = param_infos(brdf.Params)
-    values = {}
-    for setting in filter(None, settings.split(",")):
-        key, equals, value = setting.partition("=")
-        if not equals or key not in infos:
-            known = ", ".join(infos)
-            raise InputError(f"--material {text!r}: {kind} has no parameter {key!r} (known: {known})")
-        values[key] = parse(key, infos[key], value)
-    top = scene.named(name)
+    if not (name and equals and kind):
+        raise InputError(f"--material {text!r}: write NODE=KIND:key=value,…")
+    try:
+        top = scene.named(name)
+        brdf = registry.brdf(kind)
+        values = _values(settings, kind, param_infos(brdf.Params))
+    except LucarneError as error:
+        raise InputError(f"--material {text!r}: {error}") from None
     material = Material(id=new_id("material"), name=f"{top.name} {kind}", model=kind, values=values)
     under = [scene[node] for node in scene.subtree(top.id)]
     changed = [
@@ -126,7 +140,23 @@ def set_material(scene: Scene, text: str, registry: Registry) -> Scene:
     ]
     if not changed:
         raise InputError(f"--material {text!r}: {top.name!r} has no mesh")
-    return scene.with_materials(material).with_nodes(*changed)
+    made = scene.with_materials(material).with_nodes(*changed)
+    used = {slot for node in made.of(MeshObject) for slot in node.materials}
+    gone = {slot for node in scene.of(MeshObject) for slot in node.materials} - used
+    kept = {slot: value for slot, value in made.materials.items() if slot not in gone}
+    return dataclasses.replace(made, materials=frozen_map(kept))
+
+
+def _values(settings: str, kind: str, infos: Mapping[str, ParamInfo]) -> Mapping[str, Value]:
+    values: dict[str, Value] = {}
+    for setting in filter(None, settings.split(",")):
+        key, equals, value = setting.partition("=")
+        if key not in infos:
+            raise InputError(f"{kind} has no parameter {key!r}; known: {', '.join(infos) or 'none'}")
+        if not equals:
+            raise InputError(f"write {key}=VALUE")
+        values[key] = parse(key, infos[key], value)
+    return frozen_map(values)
 
 
 def build(options: argparse.Namespace, registry: Registry) -> tuple[Scene, list[str]]:
@@ -138,8 +168,8 @@ def build(options: argparse.Namespace, registry: Registry) -> tuple[Scene, list[
         notes += [f"{request.path.name}: {note}" for note in model.notes]
         scene = place(scene, model, request.transform)
     if options.floor is not None:
-        if not 0 < options.floor <= 1e4:
-            raise InputError("--floor: expected a size over 0 and at most 10000 metres")
+        if not 1e-3 <= options.floor <= 1e4:
+            raise InputError(f"--floor {options.floor:g}: expected 0.001 to 10000 metres")
         node, material = floor(options.floor)
         scene = Add((node,), (material,))(scene)
     if options.env is not None:
@@ -150,7 +180,8 @@ def build(options: argparse.Namespace, registry: Registry) -> tuple[Scene, list[
         scene = scene.with_nodes(Environment(id=new_id("environment"), name=options.env.stem, image=image))
     for text in options.material:
         scene = set_material(scene, text, registry)
-    return scene.with_nodes(*cameras(scene, options.camera)), notes
+    made = {camera.id: camera for camera in cameras(scene, options.camera)}
+    return dataclasses.replace(scene, nodes=frozen_map({**made, **scene.nodes})), notes
 
 
 def place(scene: Scene, model: ImportedModel, transform: Transform) -> Scene:
@@ -159,29 +190,33 @@ def place(scene: Scene, model: ImportedModel, transform: Transform) -> Scene:
     nodes = []
     for node in model.nodes:
         if node.parent is None:
-            name, number = node.name, 2
-            while name in taken:
-                name, number = f"{node.name} {number}", number + 1
-            taken.add(name)
+            name = _free(node.name, taken)
             node = dataclasses.replace(node, name=name, transform=transform @ node.transform)
         nodes.append(node)
     return Add(tuple(nodes), model.materials)(scene)
 
 
 def cameras(scene: Scene, texts: Sequence[str]) -> list[Camera]:
-    """One camera a text, or one that frames the scene."""
+    """One camera a text; without texts one that frames the scene, unless a model brought its own."""
     if texts:
         made = [parse_camera(text) for text in texts]
+    elif any(True for _ in scene.of(Camera)):
+        made = []
     else:
         view: View = scene_view(scene, None, 960, 540)
         made = [(view.transform, view.fov, view.focus)]
-    return [
-        Camera(
-            id=new_id("camera"),
-            name="Camera" if index == 0 else f"Camera {index + 1}",
-            transform=transform,
-            fov=fov,
-            focus=focus,
-        )
-        for index, (transform, fov, focus) in enumerate(made)
-    ]
+    taken = {node.name for node in scene.nodes.values()}
+    found = []
+    for transform, fov, focus in made:
+        name = _free("Camera", taken)
+        found.append(Camera(id=new_id("camera"), name=name, transform=transform, fov=fov, focus=focus))
+    return found
+
+
+def _free(name: str, taken: set[str]) -> str:
+    """The name, with a number when it is taken; it is taken then."""
+    made, number = name, 2
+    while made in taken:
+        made, number = f"{name} {number}", number + 1
+    taken.add(made)
+    return made

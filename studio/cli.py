@@ -3,40 +3,94 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
+import os
 import sys
 from collections.abc import Sequence
 from pathlib import Path
+from typing import NoReturn
 
 from studio_core import __version__
-from studio_core.errors import LucarneError
+from studio_core.errors import InputError, LucarneError
 
 VERBS = ("demo", "new", "info", "render", "radiance", "export", "script", "bench", "stress", "doctor")
+BAD_INPUT, OUR_FAULT, INTERRUPTED, NOBODY_READS = 2, 70, 130, 141
+TRACEBACK = "LUCARNE_TRACEBACK"
+MOST_THREADS = 1024
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run a command; the exit status. Bad input gives one line on stderr and status 2."""
+    """Run a command; the exit status.
+
+    Bad input gives one line on stderr and 2, a mistake of ours 70, Ctrl-C 130, a reader of our output
+    that went away 141. With LUCARNE_TRACEBACK=1 the place is shown as well.
+    """
     given = list(sys.argv[1:] if arguments is None else arguments)
+    for stream in (sys.stdout, sys.stderr):
+        with contextlib.suppress(AttributeError, OSError, ValueError):  # closed, or a test's own
+            stream.reconfigure(errors="backslashreplace")  # type: ignore[union-attr]
     try:
-        if not given or (given[0] not in VERBS and not given[0].startswith("-")):
-            return _window(given)
-        options = _parser().parse_args(given)
-        return _run(options)
-    except LucarneError as error:
-        print(f"lucarne: {error}", file=sys.stderr)
-        return 2
-    except OSError as error:
-        print(f"lucarne: {error}", file=sys.stderr)
-        return 2
+        status = _command(given)
+        if sys.stdout is not None:
+            sys.stdout.flush()
+        return status
     except KeyboardInterrupt:
-        print("lucarne: stopped", file=sys.stderr)
-        return 130
+        _complain("stopped")
+        return INTERRUPTED
+    except BrokenPipeError:
+        with contextlib.suppress(OSError, ValueError):
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # nothing is left to flush
+        return NOBODY_READS
+    except LucarneError as error:
+        _complain(str(error))
+    except OSError as error:
+        _complain(_of_the_system(error))
+    except MemoryError:
+        _complain("there is not enough memory; fewer vertices, directions or pixels take less")
+    except Exception as error:  # what is left is our own fault, and is said in one line too
+        where = "" if os.environ.get(TRACEBACK) else f"; {TRACEBACK}=1 shows where"
+        _complain(f"this is a mistake in Lucarne: {type(error).__name__}: {error}{where}")
+        return OUR_FAULT
+    return BAD_INPUT
+
+
+def _complain(text: str) -> None:
+    """One line on stderr, whatever a file or a library put into the text."""
+    from studio_core.project.faults import plain
+
+    if os.environ.get(TRACEBACK):
+        import traceback
+
+        traceback.print_exc()
+    with contextlib.suppress(OSError):
+        print(f"lucarne: {plain(' '.join(text.split()))}", file=sys.stderr)
+
+
+def _of_the_system(error: OSError) -> str:
+    from studio_core.project.faults import cause
+
+    return f"{error.filename}: {cause(error)}" if error.filename else cause(error)
+
+
+def _command(given: list[str]) -> int:
+    if not given or (given[0] not in VERBS and not given[0].startswith("-")):
+        return _window(given)
+    try:
+        options = parser().parse_args(given)
+    except SystemExit as done:  # --help, --version
+        return int(done.code or 0)
+    return _run(options)
 
 
 def _window(given: list[str]) -> int:
     from studio.display import why_no_window
 
+    path = Path(given[0]) if given else None
+    if path is not None and not path.is_file():
+        what = "is a folder, not a project" if path.is_dir() else "is neither a verb nor a project file"
+        raise InputError(f"{given[0]!r} {what}; verbs: {', '.join(VERBS)}")
     if len(given) > 1:
-        raise LucarneError("a window shows one project: lucarne [FILE]")
+        raise InputError("a window shows one project: lucarne [FILE]")
     reason = why_no_window()
     if reason:
         raise LucarneError(
@@ -44,7 +98,7 @@ def _window(given: list[str]) -> int:
         )
     from studio.app import run_window
 
-    return run_window(Path(given[0]) if given else None)
+    return run_window(path)
 
 
 def _run(options: argparse.Namespace) -> int:
@@ -54,95 +108,150 @@ def _run(options: argparse.Namespace) -> int:
     program = Headless(quiet=options.quiet, threads=options.threads)
     try:
         if options.verb in ("bench", "stress"):
+            if options.json is not None:
+                verbs.check_target(options.json)
             from studio.bench import run
 
             return run(options, program)
-        if options.verb == "doctor":
-            from studio.doctor import doctor
+        if options.verb == "script":
+            return verbs.script(options, program)
+        # What libraries and plugins print must not meet a result that a machine reads.
+        with contextlib.redirect_stdout(sys.stderr) if options.json else contextlib.nullcontext():
+            if options.verb == "doctor":
+                from studio.doctor import doctor
 
-            return doctor(options)
-        return getattr(verbs, options.verb)(options, program) or 0
+                return doctor(options, program)
+            return getattr(verbs, options.verb)(options, program) or 0
     finally:
         program.close()
 
 
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        prog="lucarne", description="Furnish and light a room truthfully. Without a verb: the window."
+class _Parser(argparse.ArgumentParser):
+    """Says what is wrong in one line, as everything else here does."""
+
+    def error(self, message: str) -> NoReturn:
+        verb = self.prog.partition(" ")[2]
+        raise InputError(f"{verb}: {message}; see {self.prog} --help" if verb else f"{message}; see --help")
+
+
+def _threads(text: str) -> int:
+    try:
+        count = int(text)
+    except ValueError:
+        count = 0
+    if not 1 <= count <= MOST_THREADS:
+        raise argparse.ArgumentTypeError(f"expected a number from 1 to {MOST_THREADS}, not {text!r}")
+    return count
+
+
+def parser() -> argparse.ArgumentParser:
+    """All verbs and their options."""
+    made = _Parser(
+        prog="lucarne",
+        usage="lucarne [FILE]\n       lucarne VERB …",
+        description="Furnish and light a room truthfully. Without a verb: the window.",
+        allow_abbrev=False,
     )
-    parser.add_argument("--version", action="version", version=f"lucarne {__version__}")
-    verbs = parser.add_subparsers(dest="verb", required=True, metavar="VERB")
+    made.add_argument("--version", action="version", version=f"lucarne {__version__}")
+    verbs = made.add_subparsers(dest="verb", required=True, metavar="VERB", prog="lucarne")
 
     def verb(name: str, text: str, json: bool = True) -> argparse.ArgumentParser:
-        made = verbs.add_parser(name, help=text, description=text)
+        one = verbs.add_parser(name, help=text, description=text, allow_abbrev=False)
         if json:
-            made.add_argument("--json", action="store_true", help="machine-readable result on stdout")
-        made.add_argument("--quiet", action="store_true", help="no progress on stderr")
-        made.add_argument("--threads", type=int, metavar="N", help="kernel threads (default: all cores)")
-        return made
+            one.add_argument("--json", action="store_true", help="machine-readable result on stdout")
+        one.add_argument("--quiet", action="store_true", help="no progress on stderr")
+        one.add_argument("--threads", type=_threads, metavar="N", help="kernel threads (default: all cores)")
+        return one
 
     demo = verb("demo", "the sample room in a window, or as a picture where there is no display")
     demo.add_argument("--headless", action="store_true", help="render even where a window could be opened")
-    demo.add_argument("-o", "--out", type=Path, metavar="PNG")
+    demo.add_argument("-o", "--out", type=Path, metavar="PNG", help="render to this picture")
+    _backend_options(demo)
     _picture_options(demo)
 
     new = verb("new", "make a project from files")
-    new.add_argument("out", type=Path, metavar="OUT.lucarne")
-    new.add_argument("--mesh", action="append", default=[], metavar="FILE[@x,y,z[,degrees_y[,scale]]]")
+    new.add_argument("out", type=Path, metavar="OUT.lucarne", help="a project that is there is kept as OUT~")
+    new.add_argument(
+        "--mesh",
+        action="append",
+        default=[],
+        metavar="FILE[@x,y,z[,degrees_y[,scale]]]",
+        help="a model and where it stands: metres, turned about the vertical, scaled; may be repeated",
+    )
     new.add_argument("--unit", choices=("m", "cm", "mm", "in"), default="m", help="of the mesh files")
     new.add_argument("--env", type=Path, metavar="FILE", help="HDR environment")
     new.add_argument("--floor", type=float, metavar="SIZE", help="a square floor, metres")
-    new.add_argument("--material", action="append", default=[], metavar="NODE=KIND:key=value,…")
-    new.add_argument("--camera", action="append", default=[], metavar="from=x,y,z:to=x,y,z:fov=deg")
+    new.add_argument(
+        "--material",
+        action="append",
+        default=[],
+        metavar="NODE=KIND:key=value,…",
+        help="another material for a node and all under it; colours are r/g/b or #rrggbb; may be repeated",
+    )
+    new.add_argument(
+        "--camera",
+        action="append",
+        default=[],
+        metavar="from=x,y,z:to=x,y,z:fov=deg",
+        help="a camera (default: one that shows everything); may be repeated",
+    )
 
     info = verb("info", "what a project file holds")
-    info.add_argument("file", type=Path)
+    info.add_argument("file", type=Path, metavar="PROJECT")
 
     render = verb("render", "render a project to a picture")
-    render.add_argument("project", type=Path)
+    render.add_argument("project", type=Path, metavar="PROJECT")
     render.add_argument("-o", "--out", type=Path, required=True, metavar="OUT.(png|exr)")
     _backend_options(render)
     _picture_options(render)
 
     radiance = verb("radiance", "radiance and irradiance of every shading vertex as .npz")
-    radiance.add_argument("project", type=Path)
+    radiance.add_argument("project", type=Path, metavar="PROJECT")
     radiance.add_argument("-o", "--out", type=Path, required=True, metavar="OUT.npz")
-    radiance.add_argument("--directions", type=int, metavar="S")
-    radiance.add_argument("--camera", metavar="NAME")
+    radiance.add_argument("--directions", type=int, metavar="S", help="the same as --param directions=S")
+    radiance.add_argument("--camera", metavar="NAME", help="towards this camera (default: the first)")
     _backend_options(radiance)
 
     export = verb("export", "write a project as GLB, or as a Mitsuba 3 scene folder")
-    export.add_argument("project", type=Path)
+    export.add_argument("project", type=Path, metavar="PROJECT")
     export.add_argument("-o", "--out", type=Path, required=True, metavar="(OUT.glb|DIR)")
 
-    script = verb("script", "run a Python file that uses studio_core")
-    script.add_argument("file", type=Path)
-    script.add_argument("args", nargs=argparse.REMAINDER)
+    script = verb("script", "run a Python file that uses studio_core", json=False)
+    script.add_argument("file", type=Path, metavar="FILE.py")
+    script.add_argument("args", nargs=argparse.REMAINDER, metavar="ARGS", help="its sys.argv[1:]")
 
     bench = verb("bench", "measure time against error", json=False)
     stress = verb("stress", "numbers that the tests don't assert", json=False)
-    for made in (bench, stress):
-        made.add_argument("name")
-        made.add_argument("--quick", action="store_true", help="within 3 minutes")
-        made.add_argument("--json", type=Path, metavar="OUT", help="write the rows here")
+    for one in (bench, stress):
+        one.add_argument("name", metavar="NAME", help="which one; an unknown name lists them")
+        one.add_argument("--quick", action="store_true", help="within 3 minutes")
+        one.add_argument("--json", type=Path, metavar="OUT", help="write the rows here")
     verb("doctor", "check this installation")
-    return parser
+    return made
 
 
-def _backend_options(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--backend", default="reference", metavar="ID")
-    parser.add_argument("--param", action="append", default=[], metavar="KEY=VALUE")
-    parser.add_argument("--indirect", metavar="ID")
-    parser.add_argument("--bounces", type=int, metavar="N")
+def _backend_options(verb: argparse.ArgumentParser) -> None:
+    verb.add_argument("--backend", default="reference", metavar="ID", help="how light is summed")
+    verb.add_argument(
+        "--param",
+        action="append",
+        default=[],
+        metavar="KEY=VALUE",
+        help="a parameter of the backend, such as directions=4096 or vertices=100000; may be repeated",
+    )
+    verb.add_argument("--indirect", metavar="ID", help="a layer of light between surfaces on top")
+    verb.add_argument("--bounces", type=int, metavar="N", help="of the indirect layer")
 
 
-def _picture_options(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--camera", metavar="NAME")
-    parser.add_argument("--size", default="960x540", metavar="WxH")
-    parser.add_argument("--exposure", type=float, default=0.0, metavar="EV")
-    parser.add_argument("--tonemap", choices=("srgb", "filmic", "raw"), default="srgb")
-    parser.add_argument(
-        "--antialias", type=int, choices=range(1, 9), default=2, metavar="N", help="N×N samples"
+def _picture_options(verb: argparse.ArgumentParser) -> None:
+    verb.add_argument("--camera", metavar="NAME", help="what this camera sees (default: the first)")
+    verb.add_argument("--size", default="960x540", metavar="WxH", help="pixels (default: 960x540)")
+    verb.add_argument("--exposure", type=float, default=0.0, metavar="EV", help="of a PNG")
+    verb.add_argument(
+        "--tonemap", choices=("srgb", "filmic", "raw"), default="srgb", help="tone curve of a PNG"
+    )
+    verb.add_argument(
+        "--antialias", type=int, choices=range(1, 9), default=2, metavar="N", help="N×N samples a pixel"
     )
 
 

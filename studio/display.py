@@ -11,18 +11,26 @@ def why_no_window() -> str:
     """Empty when a window can be opened, else the reason."""
     if sys.platform.startswith("linux"):
         platform = os.environ.get("QT_QPA_PLATFORM", "")
-        if platform == "offscreen":
-            return "QT_QPA_PLATFORM is offscreen"
+        if platform.partition(":")[0] in ("offscreen", "minimal"):
+            return f"QT_QPA_PLATFORM is {platform}"
         if not platform and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
             return "there is no display"
     probe = "from PySide6.QtGui import QGuiApplication; QGuiApplication([])"
     try:
         tried = subprocess.run(
-            [sys.executable, "-c", probe], capture_output=True, text=True, timeout=30, check=False
+            [sys.executable, "-c", probe],
+            stdin=subprocess.DEVNULL,
+            capture_output=True,
+            text=True,
+            errors="replace",
+            timeout=30,
+            check=False,
         )
     except subprocess.TimeoutExpired:
         return "the display does not answer"
     if tried.returncode == 0:
         return ""
+    if "ModuleNotFoundError" in tried.stderr:
+        return "PySide6 is not installed"
     lines = [line for line in tried.stderr.splitlines() if line.strip()]
     return lines[-1] if lines else "Qt cannot open the display"

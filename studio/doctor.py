@@ -9,15 +9,15 @@ import platform
 from collections.abc import Callable
 
 from studio.display import why_no_window
+from studio.headless import Headless
 from studio_core import __version__
-from studio_core.registry import PluginHost
 
 NEEDED = ("numpy", "numba", "embreex", "trimesh", "OpenImageIO", "opencv-contrib-python-headless")
 WINDOW = ("PySide6-Essentials", "pyqtgraph", "vispy")
 OPTIONAL = {"mitsuba": "checks against Mitsuba 3 are left out"}
 
 
-def doctor(options: argparse.Namespace) -> int:
+def doctor(options: argparse.Namespace, program: Headless) -> int:
     """Print one line a check; status 1 when something needed is missing."""
     checks: list[tuple[str, str, str]] = []
 
@@ -37,16 +37,20 @@ def doctor(options: argparse.Namespace) -> int:
     _try(note, "sample room", _sample)
     reason = why_no_window()
     note("window", "absent" if reason else "ok", reason)
-    host = PluginHost.discover()
-    note("plugins", "ok" if not host.failures else "failed", ", ".join(p.id for p in host.plugins))
+    host = program.registry
+    for kind in ("brdf", "backend", "importer", "exporter"):
+        found = host.available(kind)
+        note(f"{kind}s", "ok" if found else "missing", ", ".join(found) or "reinstall Lucarne with pip")
+    note("plugins", "failed" if host.failures else "ok", ", ".join(plugin.id for plugin in host.plugins))
     for failure in host.failures:
         note(f"plugin {failure.plugin}", "failed", failure.what)
     if options.json:
-        print(json.dumps([dict(zip(("check", "state", "detail"), c, strict=True)) for c in checks], indent=1))
+        rows = [dict(zip(("check", "state", "detail"), check, strict=True)) for check in checks]
+        program.result(json.dumps(rows, indent=1))
     else:
         width = max(len(what) for what, _, _ in checks)
         for what, state, detail in checks:
-            print(f"{what:<{width}}  {state:<8}{detail}".rstrip())
+            program.result(f"{what:<{width}}  {state:<8}{detail}".rstrip())
     return int(any(state in ("missing", "failed") for _, state, _ in checks))
 
 
@@ -65,8 +69,15 @@ def _try(note: Callable[[str, str, str], None], what: str, check: Callable[[], s
 
 
 def _kernels() -> str:
-    from studio_core import jit
+    import numpy as np
 
+    from studio_core import jit
+    from studio_core.kernels.compose import texel
+
+    found = np.zeros(9, np.float32)
+    texel(np.full((1, 9), 0.5, np.float32), 0, 1, 1, 0.3, 0.3, found)
+    if not (found == 0.5).all():
+        raise RuntimeError(f"a kernel computed {found[0]} for 0.5")
     return f"compiled code is kept in {jit.CACHE_FOLDER}" if jit.CACHE_FOLDER else "compiled at every start"
 
 
@@ -74,14 +85,20 @@ def _tracer() -> str:
     import numpy as np
 
     from studio_core.kernels.raycast import CasterObject, RayCaster
+    from studio_core.parallel import Workers
 
     corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], np.float32)
     item = CasterObject(corners, np.array([[0, 1, 2]], np.uint32), "triangle", np.eye(4), None)
-    with RayCaster([item]) as caster:
+    with RayCaster([item]) as caster, Workers(1) as workers:
+        rays = np.array([[0.2, 0.2, 1], [0.9, 0.9, 1]]), np.array([[0, 0, -1.0], [0, 0, -1]])
+        found = caster.closest(*rays, 0.0, np.inf, workers)
+        if not (found.t[0] == 1 and found.object[1] == -1):
+            raise RuntimeError("a triangle is not where it should be")
         return f"{caster.backend} {caster.reason}".strip()
 
 
 def _sample() -> str:
     from studio.samples import sample
+    from studio_core.project.store import info
 
-    return str(sample())
+    return str(info(sample()).path)

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
 import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
+from typing import TextIO
 
 from studio_core.contract import Services
 from studio_core.registry import PluginHost
@@ -16,10 +18,11 @@ from studio_core.shading.job import Job
 
 @dataclass
 class Headless:
-    """Plugins, threads and progress for one command."""
+    """Plugins, threads, progress and result for one command."""
 
     quiet: bool = False
     threads: int | None = None
+    out: TextIO | None = field(default_factory=lambda: sys.stdout)
 
     @cached_property
     def registry(self) -> PluginHost:
@@ -36,14 +39,20 @@ class Headless:
 
         return Services(Workers(self.threads), self.registry)
 
-    def say(self, text: str) -> None:
-        """One line on stderr."""
-        print(text, file=sys.stderr, flush=True)
+    def say(self, text: str, end: str = "\n") -> None:
+        """One line on stderr, where there is one."""
+        with contextlib.suppress(OSError):
+            print(text, end=end, file=sys.stderr, flush=True)
+
+    def result(self, text: str) -> None:
+        """What the command was asked for, on stdout."""
+        if self.out is not None:
+            print(text, file=self.out)
 
     @contextmanager
     def job(self, label: str) -> Iterator[Job]:
         """A job whose progress is shown on stderr while it is a terminal, and timed at its end."""
-        shown = sys.stderr.isatty() and not self.quiet
+        shown = not self.quiet and sys.stderr is not None and sys.stderr.isatty()
         last = 0.0
 
         def progress(job: Job) -> None:
@@ -51,12 +60,17 @@ class Headless:
             now = time.monotonic()
             if shown and job.total and now - last > 0.2:
                 last = now
-                print(f"\r{label}: {100 * job.done // job.total:3d} %", end="", file=sys.stderr, flush=True)
+                self.say(f"\r{label}: {100 * job.done // job.total:3d} %", end="")
 
         started = time.monotonic()
-        yield Job(label, progress)
+        try:
+            yield Job(label, progress)
+        except BaseException:
+            if last:
+                self.say("")  # what follows gets a line of its own
+            raise
         if not self.quiet:
-            start = "\r" if shown else ""
+            start = "\r" if last else ""
             self.say(f"{start}{label}: {time.monotonic() - started:.1f} s")
 
     def close(self) -> None:

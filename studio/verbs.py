@@ -3,9 +3,17 @@
 from __future__ import annotations
 
 import argparse
+import dataclasses
 import json
+import math
+import os
 import runpy
+import secrets
+import shutil
 import sys
+import traceback
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, nullcontext, suppress
 from pathlib import Path
 from typing import Any
 
@@ -13,15 +21,31 @@ import numpy as np
 
 from studio.headless import Headless
 from studio_core.contract import ShadingBackend
-from studio_core.errors import InputError
-from studio_core.scene.nodes import Light, Scene
+from studio_core.errors import InputError, ProjectError
+from studio_core.scene.nodes import Light, MeshObject, Scene
 
 PICTURES = (".png", ".exr")
+MOST_PIXELS = 16384
+MOST_EXPOSURE = 64.0
+SAMPLE_BYTES = 64  # of a picture's sample while it is made
 
 
-def result(options: argparse.Namespace, values: dict[str, Any], text: str) -> None:
+def result(options: argparse.Namespace, program: Headless, values: dict[str, Any], text: str) -> None:
     """The machine-readable result with --json, else a line for people, on stdout."""
-    print(json.dumps(values, indent=1) if options.json else text)
+    program.result(json.dumps(values, indent=1, allow_nan=False) if options.json else text)
+
+
+def check_target(path: Path, suffixes: Sequence[str] = (), what: str = "files") -> None:
+    """InputError when a file of that name cannot be written: asked before the work, not after it."""
+    if suffixes and path.suffix.lower() not in suffixes:
+        raise InputError(f"{path}: {what} are written as {' or '.join(suffixes)}")
+    folder = path.parent
+    if not folder.is_dir():
+        raise InputError(f"{path} cannot be written: there is no folder {folder}")
+    if path.is_dir():
+        raise InputError(f"{path} cannot be written: it is a folder")
+    if not os.access(folder, os.W_OK):
+        raise InputError(f"{path} cannot be written: access to the folder {folder} is denied")
 
 
 def new(options: argparse.Namespace, program: Headless) -> None:
@@ -29,15 +53,50 @@ def new(options: argparse.Namespace, program: Headless) -> None:
     from studio.build_scene import build
     from studio_core.project.store import save
 
-    if options.out.suffix != ".lucarne":
-        raise InputError(f"{options.out}: a project's name ends in .lucarne")
-    scene, notes = build(options, program.registry)
-    for note in notes:
-        program.say(note)
-    save(options.out, scene, label="New", fresh=True)
+    out = options.out
+    check_target(out, (".lucarne",), "projects")
+    with _replacing(out, program) if _holds_something(out) else nullcontext():
+        scene, notes = build(options, program.registry)
+        for note in notes:
+            program.say(note)
+        save(out, scene, label="New", fresh=True)
     faces = sum(len(node.geometry.faces) for node in scene.nodes.values() if hasattr(node, "geometry"))
-    values = {"project": str(options.out), "nodes": len(scene.nodes), "faces": faces, "notes": notes}
-    result(options, values, f"{options.out}: {len(scene.nodes)} nodes, {faces} faces")
+    values = {"project": str(out), "nodes": len(scene.nodes), "faces": faces, "notes": notes}
+    result(options, program, values, f"{out}: {len(scene.nodes)} nodes, {faces} faces")
+
+
+def _holds_something(path: Path) -> bool:
+    return os.path.lexists(path) and not (path.is_file() and path.stat().st_size == 0)
+
+
+@contextmanager
+def _replacing(path: Path, program: Headless) -> Iterator[None]:
+    """Around a save over a project: nobody has it open, and what it held is kept beside it as NAME~."""
+    from studio_core.project.lock import acquire
+    from studio_core.project.recovery import discard, recovery_path
+    from studio_core.project.store import info as project_info
+
+    try:
+        project_info(path)
+    except ProjectError as error:
+        raise InputError(f"{path} is there and is no project that can be replaced ({error})") from None
+    path = path.resolve()
+    kept = path.with_name(f"{path.name}~")
+    with acquire(path):
+        if kept.is_dir():
+            raise InputError(f"{path} cannot be replaced: the folder {kept} is where it would be kept")
+        beside = path.with_name(f".{path.name}.{secrets.token_hex(4)}.old")
+        try:
+            try:
+                os.link(path, beside)
+            except OSError:
+                shutil.copy2(path, beside)
+            yield
+            beside.replace(kept)
+        finally:
+            beside.unlink(missing_ok=True)
+        discard(recovery_path(path))  # of a session with what is now in NAME~
+    program.say(f"{path.name} was there: it is now {kept.name}")
 
 
 def open_scene(path: Path) -> Scene:
@@ -55,6 +114,8 @@ def chosen_backend(
 
     if options.indirect is not None:
         raise InputError(f"--indirect {options.indirect}: no indirect layer of that name is installed")
+    if options.bounces is not None:
+        raise InputError("--bounces: there is no indirect layer to bounce; name one with --indirect")
     backend: ShadingBackend = program.registry.get("backend", options.backend)
     values: dict[str, object] = dict(extra)
     for text in options.param:
@@ -62,7 +123,10 @@ def chosen_backend(
         if not equals:
             raise InputError(f"--param {text!r}: write KEY=VALUE")
         values[name] = value
-    return backend, backend_params(backend, values)
+    try:
+        return backend, backend_params(backend, values)
+    except InputError as error:
+        raise InputError(f"--param: {error}") from None
 
 
 def parse_size(text: str) -> tuple[int, int]:
@@ -71,90 +135,130 @@ def parse_size(text: str) -> tuple[int, int]:
         width, height = (int(part) for part in text.lower().split("x"))
     except ValueError:
         raise InputError(f"--size {text!r}: write WIDTHxHEIGHT") from None
-    if not (1 <= width <= 16384 and 1 <= height <= 16384):
-        raise InputError(f"--size {text!r}: expected 1 to 16384 pixels each way")
+    if not (1 <= width <= MOST_PIXELS and 1 <= height <= MOST_PIXELS):
+        raise InputError(f"--size {text!r}: expected 1 to {MOST_PIXELS} pixels each way")
     return width, height
+
+
+def _check_picture(options: argparse.Namespace) -> tuple[int, int]:
+    """(width, height); InputError for whatever can be told to be wrong before the work."""
+    check_target(options.out, PICTURES, "pictures")
+    width, height = parse_size(options.size)
+    if not abs(options.exposure) <= MOST_EXPOSURE:
+        raise InputError(
+            f"--exposure {options.exposure:g}: expected -{MOST_EXPOSURE:g} to {MOST_EXPOSURE:g} EV"
+        )
+    needed, there = width * height * options.antialias**2 * SAMPLE_BYTES, memory()
+    if needed > there:
+        raise InputError(
+            f"--size {options.size} with --antialias {options.antialias} needs about"
+            f" {needed / 1e9:.0f} GB of memory, and this machine has {there / 1e9:.0f} GB"
+        )
+    return width, height
+
+
+def memory() -> float:
+    """Bytes of memory of this machine; inf where that cannot be told."""
+    with suppress(AttributeError, ValueError, OSError):
+        return float(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"))
+    return math.inf
 
 
 def render(options: argparse.Namespace, program: Headless) -> None:
     """`lucarne render`."""
-    if options.out.suffix.lower() not in PICTURES:
-        raise InputError(f"{options.out}: pictures are written as .png or .exr")
-    if not options.out.parent.is_dir():
-        raise InputError(f"{options.out}: the folder {options.out.parent} does not exist")
-    backend, params = chosen_backend(options, program)
-    scene = open_scene(options.project)
-    values = render_scene(scene, options, program, backend, params)
-    values |= {"project": str(options.project), "backend": backend.id}
-    result(
-        options, values, f"{options.out}: {values['width']}×{values['height']}, {values['vertices']} vertices"
-    )
-
-
-def render_scene(
-    scene: Scene, options: argparse.Namespace, program: Headless, backend: ShadingBackend, params: Any
-) -> dict[str, Any]:
-    """Write the picture of a scene; what was done, as values."""
-    import dataclasses
-
     from studio_core.imaging.picture import write_picture
     from studio_core.shading.offline import picture, scene_view
 
-    width, height = parse_size(options.size)
+    width, height = _check_picture(options)
+    backend, params = chosen_backend(options, program)
+    scene = open_scene(options.project)
+    if not any(scene.shown(node.id) for node in scene.of(MeshObject)):
+        program.say(f"{options.project} shows no mesh: the picture is background alone")
+    if not any(scene.shown(light.id) for light in scene.of(Light)):
+        program.say(f"{options.project} has no light: the picture is black")
     view = dataclasses.replace(scene_view(scene, options.camera, width, height), antialias=options.antialias)
     with program.job("Rendering") as job:
         made = picture(scene, view, backend, params, program.services, job)
     write_picture(options.out, made.linear, exposure=options.exposure, kind=options.tonemap)
     finite = bool(np.isfinite(made.linear).all())
-    return {
+    if not finite:
+        program.say(f"{options.out}: some pixels are not finite")
+    vertices = len(made.radiance.valid)
+    values = {
+        "project": str(options.project),
         "picture": str(options.out),
+        "backend": backend.id,
         "width": width,
         "height": height,
-        "vertices": len(made.radiance.valid),
+        "vertices": vertices,
         "shaded": int(made.radiance.valid.sum()),
         "directions": made.radiance.directions,
         "finite": finite,
-        "mean": float(made.linear.mean()),
+        "mean": float(made.linear.mean(dtype=np.float64)) if finite else None,
         "counts": dict(made.radiance.counts),
     }
+    result(options, program, values, f"{options.out}: {width}×{height}, {vertices} vertices")
 
 
 def radiance(options: argparse.Namespace, program: Headless) -> None:
     """`lucarne radiance`."""
-    from studio_core.shading.offline import scene_view, shade
+    from studio_core.shading.offline import ray_origins, scene_view, shaded_pipeline
 
-    extra: dict[str, Any] = {"directions": str(options.directions)} if options.directions else {}
+    check_target(options.out, (".npz",), "vertices")
+    extra = {} if options.directions is None else {"directions": str(options.directions)}
     backend, params = chosen_backend(options, program, everywhere=True, **extra)
     scene = open_scene(options.project)
     view = scene_view(scene, options.camera, 320, 180)
     with program.job("Shading") as job:
-        made = shade(scene, view, backend, params, program.services, job)
-    write_radiance(options.out, scene, made, program)
-    values = {"out": str(options.out), "vertices": len(made.valid), "directions": made.directions}
-    result(options, values, f"{options.out}: {len(made.valid)} vertices, {made.directions} directions")
+        made, pipeline = shaded_pipeline(scene, view, backend, params, program.services, job)
+    write_radiance(options.out, scene, made, ray_origins(pipeline, made), program)
+    values = {
+        "project": str(options.project),
+        "out": str(options.out),
+        "backend": backend.id,
+        "vertices": len(made.valid),
+        "directions": made.directions,
+    }
+    result(
+        options,
+        program,
+        values,
+        f"{options.out}: {len(made.valid)} vertices, {made.directions} directions",
+    )
 
 
-def write_radiance(path: Path, scene: Scene, made: Any, program: Headless) -> None:
-    """Per shading vertex: node, position, normal, area, radiance towards the camera, irradiance (npz)."""
+def write_radiance(path: Path, scene: Scene, made: Any, origins: Any, program: Headless) -> None:
+    """Per shading vertex: node, position, normal, area, radiance towards the camera, irradiance (npz).
+
+    `origin` is where the vertex' rays start: in creases another origin sees something else.
+    """
     from studio_core.shading.vertex_radiance import vertex_radiance
 
     lights = {light.id: light for light in scene.of(Light) if scene.shown(light.id)}
     mesh = made.surfaces.mesh
-    with path.open("wb") as file:
-        np.savez_compressed(
-            file,
-            nodes=np.array(made.surfaces.nodes),
-            names=np.array([scene[node].name for node in made.surfaces.nodes]),
-            node=mesh.object,
-            position=mesh.positions + mesh.origin,
-            normal=mesh.normals,
-            area=mesh.area,
-            side=mesh.side,
-            radiance=vertex_radiance(scene, made, program.registry),
-            irradiance=made.irradiance(lights),
-            valid=made.valid,
-            directions=np.int64(made.directions),
-        )
+    columns = {
+        "nodes": np.array(made.surfaces.nodes, str),
+        "names": np.array([scene[node].name for node in made.surfaces.nodes], str),
+        "node": mesh.object,
+        "position": mesh.positions + mesh.origin,
+        "origin": origins,
+        "normal": mesh.normals,
+        "area": mesh.area,
+        "side": mesh.side,
+        "radiance": vertex_radiance(scene, made, program.registry),
+        "irradiance": made.irradiance(lights),
+        "valid": made.valid,
+        "directions": np.int64(made.directions),
+    }
+    beside = path.with_name(f".{path.stem[:40]}-{secrets.token_hex(6)}.npz")
+    try:
+        with beside.open("wb") as file:
+            np.savez_compressed(file, **columns)
+        beside.replace(path)
+    except OSError as error:
+        raise InputError(f"{path} cannot be written: {error.strerror or error}") from None
+    finally:
+        beside.unlink(missing_ok=True)
 
 
 def info(options: argparse.Namespace, program: Headless) -> None:
@@ -166,49 +270,63 @@ def info(options: argparse.Namespace, program: Headless) -> None:
     values: dict[str, Any] = {
         "project": str(found.path),
         "format": found.format,
-        "saved by": found.program,
-        "file bytes": found.file_bytes,
-        "array bytes": found.array_bytes,
+        "saved_by": found.program,
+        "file_bytes": found.file_bytes,
+        "array_bytes": found.array_bytes,
         "arrays": found.arrays,
         "items": found.items,
-        "undo steps": found.steps,
+        "undo_steps": found.steps,
         "nodes": dict(found.nodes),
         "materials": dict(found.materials),
-        "opened by": found.opened_by,
+        "opened_by": found.opened_by,
         "revisions": revisions,
     }
-    shown = {**values, "opened by": found.opened_by or "nobody", "revisions": len(revisions)}
-    shown |= {
-        key: ", ".join(f"{n} {kind}" for kind, n in values[key].items()) for key in ("nodes", "materials")
-    }
-    result(options, values, "\n".join(f"{key:<12} {value}" for key, value in shown.items()))
+    shown = {**values, "opened_by": found.opened_by or "nobody", "revisions": len(revisions)}
+    for key in ("nodes", "materials"):
+        shown[key] = ", ".join(f"{count} {kind}" for kind, count in values[key].items()) or "none"
+    lines = [f"{key.replace('_', ' '):<12} {value}" for key, value in shown.items()]
+    result(options, program, values, "\n".join(lines))
 
 
 def export(options: argparse.Namespace, program: Headless) -> None:
     """`lucarne export`."""
+    out = options.out
+    suffix = "" if out.is_dir() else out.suffix.lower()
+    offered = [program.registry.get("exporter", name) for name in program.registry.names("exporter")]
+    fitting = [one for one in offered if suffix in one.extensions or (not suffix and not one.extensions)]
+    if not fitting:
+        known = ", ".join(sorted(kind for one in offered for kind in one.extensions)) or "none"
+        raise InputError(f"{out}: write to a file ({known}), or to a folder for Mitsuba 3")
+    if suffix:
+        check_target(out)
+    elif out.exists() and not out.is_dir():
+        raise InputError(f"{out} cannot be written: it is a file, and Mitsuba's scene is a folder")
     scene = open_scene(options.project)
-    suffix = options.out.suffix.lower()
-    found = None
-    for name in program.registry.names("exporter"):
-        exporter = program.registry.get("exporter", name)
-        if suffix in exporter.extensions or (not suffix and not exporter.extensions):
-            found = exporter
-            break
-    if found is None:
-        raise InputError(f"{options.out}: write to a .glb file, or to a folder for Mitsuba 3")
-    notes = found.save(scene, options.out, program.registry)
+    notes = list(fitting[0].save(scene, out, program.registry))
     for note in notes:
         program.say(note)
-    result(options, {"out": str(options.out), "notes": list(notes)}, f"{options.out}: {found.label}")
+    values = {"project": str(options.project), "out": str(out), "notes": notes}
+    result(options, program, values, f"{out}: {fitting[0].label}")
 
 
-def script(options: argparse.Namespace, program: Headless) -> None:
-    """`lucarne script`: a Python file with `studio_core` at hand, as `__main__`."""
+def script(options: argparse.Namespace, program: Headless) -> int:
+    """`lucarne script`: a Python file with `studio_core` at hand, as `__main__`; 1 when it raises."""
     if not options.file.is_file():
-        raise InputError(f"{options.file}: no such file")
+        raise InputError(f"{options.file}: there is no such file")
+    argv, path = sys.argv, list(sys.path)
     sys.argv = [str(options.file), *options.args]
     sys.path.insert(0, str(options.file.resolve().parent))
-    runpy.run_path(str(options.file), run_name="__main__")
+    try:
+        runpy.run_path(str(options.file), run_name="__main__")
+    except Exception as error:  # the user's own code: a traceback is what helps
+        trace = error.__traceback__
+        while trace is not None and trace.tb_frame.f_code.co_filename != str(options.file):
+            trace = trace.tb_next
+        traceback.print_exception(type(error), error, trace)
+        return 1
+    finally:
+        sys.argv, sys.path[:] = argv, path
+    return 0
 
 
 def demo(options: argparse.Namespace, program: Headless) -> int:
@@ -216,15 +334,18 @@ def demo(options: argparse.Namespace, program: Headless) -> int:
     from studio.display import why_no_window
     from studio.samples import sample
 
-    path = sample()
-    reason = "asked for with --headless" if options.headless else why_no_window()
+    options.project = sample()
+    if options.headless or options.out is not None:
+        reason = "a picture was asked for"
+    else:
+        reason = why_no_window()
     if not reason:
         from studio.app import run_window
 
-        return run_window(path)
-    options.project, options.backend, options.param, options.indirect = path, "reference", [], None
+        return run_window(options.project)
     if options.out is None:
         options.out = Path("living-room.png")
+    _check_picture(options)
     program.say(f"Rendering the sample room to {options.out.resolve()} ({reason})")
     render(options, program)
     return 0

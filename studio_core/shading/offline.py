@@ -5,15 +5,19 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+import numpy as np
+import numpy.typing as npt
+
 from studio_core.contract import Services, ShadingBackend
 from studio_core.errors import EditError
+from studio_core.kernels.visibility import lifted
 from studio_core.params import build, param_infos, parse
 from studio_core.raster import PictureStage
 from studio_core.scene.bounds import scene_bounds
 from studio_core.scene.diff import Changes
 from studio_core.scene.nodes import Camera, Scene
 from studio_core.session import View, framing
-from studio_core.shading.artifacts import Picture, Radiance
+from studio_core.shading.artifacts import Casters, Picture, Radiance
 from studio_core.shading.frame import Frame
 from studio_core.shading.job import Job
 from studio_core.shading.pipeline import Pipeline
@@ -29,10 +33,11 @@ def backend_params(backend: ShadingBackend, values: Mapping[str, object]) -> Any
 def scene_view(scene: Scene, camera: str | None, width: int, height: int) -> View:
     """What the named camera sees; without a name the first camera, or a view that frames everything."""
     if camera is not None:
-        node = scene.named(camera)
-        if not isinstance(node, Camera):
-            raise EditError(f"{camera!r} is no camera")
-        return View.of(node, scene, width, height)
+        for node in scene.of(Camera):
+            if camera in (node.name, node.id):
+                return View.of(node, scene, width, height)
+        known = ", ".join(repr(node.name) for node in scene.of(Camera)) or "none"
+        raise EditError(f"there is no camera {camera!r}; known: {known}")
     first = next(scene.of(Camera), None)
     if first is not None:
         return View.of(first, scene, width, height)
@@ -44,9 +49,29 @@ def shade(
     scene: Scene, view: View, backend: ShadingBackend, params: Any, services: Services, job: Job | None = None
 ) -> Radiance:
     """Radiance at the shading vertices."""
+    return shaded_pipeline(scene, view, backend, params, services, job)[0]
+
+
+def shaded_pipeline(
+    scene: Scene, view: View, backend: ShadingBackend, params: Any, services: Services, job: Job | None = None
+) -> tuple[Radiance, Pipeline]:
+    """The same, with the pipeline that has made it and holds the other artifacts."""
     pipeline = Pipeline(backend.stages(services))
     made: Radiance = pipeline.update(Frame(scene, view, params, 1), Changes(), job or Job("Shading"))
-    return made
+    return made, pipeline
+
+
+def ray_origins(pipeline: Pipeline, made: Radiance) -> npt.NDArray[np.float64]:
+    """(V, 3) where the visibility rays of the shading vertices start, world.
+
+    In creases a millionth of a metre decides what a vertex sees: a check by another tracer starts here.
+    """
+    mesh, casters = made.surfaces.mesh, pipeline.artifact(Casters)
+    positions: npt.NDArray[np.float64] = mesh.positions + mesh.origin
+    if casters is None:  # a backend that traces in its own way
+        return positions
+    starts = lifted(casters.shadow, positions, mesh.geometric, mesh.inset)
+    return casters.shadow.centre + starts
 
 
 def picture(
