@@ -192,13 +192,13 @@ class PictureFeed:
             self._queued = True
             self._later(0, self._flush)
 
-    def frame_view(self) -> View:
-        """The session's view in the pixels and samples that are right just now."""
+    def frame_view(self, moving: bool) -> View:
+        """The session's view in the pixels and samples that are right while moving, or at rest."""
         width, height = self.size
-        limit = MOVING_PIXELS if self.moving else REST_PIXELS
+        limit = MOVING_PIXELS if moving else REST_PIXELS
         shrink = min(1.0, (limit / (width * height)) ** 0.5)
         view = self._session.view.sized(round(width * shrink), round(height * shrink))
-        smooth = not self.moving and view.width * view.height * 4 <= REST_SAMPLES
+        smooth = not moving and view.width * view.height * 4 <= REST_SAMPLES
         return dataclasses.replace(view, antialias=2 if smooth else 1)
 
     def close(self) -> None:
@@ -239,7 +239,7 @@ class PictureFeed:
             return  # let one picture be seen before asking for the next
         changes, self._changes = self._changes, Changes()
         self._answered = False
-        frame = Frame(self._document.scene, self.frame_view(), self._session.params)
+        frame = Frame(self._document.scene, self.frame_view(self.moving), self._session.params)
         asked, finer_only, self._finer_only = time.monotonic(), self._finer_only, True
         revision = self._revision = self._revision + 1  # as the scheduler counts
         self._asked[revision] = asked
@@ -253,11 +253,13 @@ class PictureFeed:
             self._rests = True  # first let the quick picture be seen
             return
         self._rests = False
-        shown = self.last.view if self.last is not None else None
-        wanted = self.frame_view()
-        coarse = shown is None or (shown.width, shown.antialias) != (wanted.width, wanted.antialias)
-        if coarse or self._changes:
+        if self.last is None or self._coarse(self.last.view) or self._changes:
             self.want(view_changed(), finer=True)
+
+    def _coarse(self, view: View) -> bool:
+        """Whether a picture at rest has other pixels or samples."""
+        rest = self.frame_view(False)
+        return (view.width, view.height, view.antialias) != (rest.width, rest.height, rest.antialias)
 
     def _show(self, frame: Frame, picture: Picture, final: bool) -> None:
         self._answered = True
@@ -268,8 +270,9 @@ class PictureFeed:
         if frame.revision < self._outdated or (self._changes and not self._finer_only):
             self._tell(Freshness.STALE)
         else:
-            waits = self._changes or any(r > frame.revision for r in self._asked)
-            self._tell(Freshness.REFINING if waits or not final else Freshness.CURRENT)
+            waits = bool(self._changes) or any(r > frame.revision for r in self._asked)
+            finer = waits or not final or self._coarse(frame.view)
+            self._tell(Freshness.REFINING if finer else Freshness.CURRENT)
         self._again()
 
     def _fail(self, frame: Frame, error: Exception) -> None:

@@ -119,7 +119,7 @@ class NumberField(Field):
             self.slider.sliderReleased.connect(self._released)
             self.slider.valueChanged.connect(self._slid)
             self.row.addWidget(self.slider, 1)
-            self.spin.setMaximumWidth(86)
+            self.spin.setFixedWidth(76)
         self.row.addWidget(self.spin, 0 if self.slider else 1)
         self.spin.valueChanged.connect(self._typed)
 

@@ -164,7 +164,9 @@ def palette(theme: Theme) -> QPalette:
 
 
 def wear(application: QApplication, theme: Theme) -> None:
-    """Dress the whole application."""
-    application.setStyle("Fusion")
-    application.setPalette(palette(theme))
-    application.setStyleSheet(_SHEET.substitute(vars(theme)))
+    """Dress the whole application; nothing happens when it wears the theme already."""
+    sheet = _SHEET.substitute(vars(theme))
+    if application.styleSheet() != sheet:
+        application.setStyle("Fusion")
+        application.setPalette(palette(theme))
+        application.setStyleSheet(sheet)

@@ -60,7 +60,7 @@ class ViewControls(QWidget):
         layout = QHBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
         layout.setSpacing(GAP)
-        for label, widget in (("", self.camera), ("EV", self.exposure), ("", self.transform)):
+        for label, widget in (("", self.camera), ("Exposure", self.exposure), ("", self.transform)):
             if label:
                 text = QLabel(label)
                 text.setProperty("role", "dim")

@@ -262,7 +262,7 @@ class RasterViewport(QWidget):
 
     def mousePressEvent(self, event: QMouseEvent) -> None:
         """Remember the button until it is released."""
-        if self._held == "none":
+        if self._held == "none" or event.buttons() == event.button():  # a release may have been missed
             self._held = _BUTTONS.get(event.button(), "none")
             self._send("press", event)
 

@@ -50,6 +50,7 @@ class LightingPanel(Panel):
     def __init__(self, context: Context, load: Callable[[], object]) -> None:
         super().__init__(context)
         self.light: NodeId | None = None
+        self._sink = EditSink(context.editing, self._make, self._label)
         self.form: ParamForm | None = None
         self.preview = QLabel()
         self.preview.setMinimumHeight(20)
@@ -150,14 +151,14 @@ class LightingPanel(Panel):
         key = (self.light, type(light))
         if key != self._built:
             self._built = key
+            self._sink.commit()
             clear(self._column)
             self.form = None
             if isinstance(light, Light):
-                sink = EditSink(self.context.editing, self._make, lambda name: self._label(name))
                 self._on = QCheckBox("On")
                 self._on.toggled.connect(lambda on: self._switch(on))
                 self._column.addWidget(self._on)
-                self.form = ParamForm(param_infos(type(light)), sink, skip=("locked", "hidden"))
+                self.form = ParamForm(param_infos(type(light)), self._sink, skip=("locked", "hidden"))
                 self._column.addWidget(self.form)
             else:
                 self._column.addWidget(note("The scene has no light: load an environment or add a lamp."))

@@ -38,6 +38,7 @@ class MaterialsPanel(Panel):
     def __init__(self, context: Context) -> None:
         super().__init__(context)
         self.material: MaterialId | None = None
+        self._sink = EditSink(context.editing, self._make, lambda name: self._make(name, 0.0).label)
         self.form: ParamForm | None = None
         self.common: ParamForm | None = None
         self.list = QListWidget()
@@ -164,13 +165,14 @@ class MaterialsPanel(Panel):
             return None
 
     def _build(self, material: Material | None, model: Brdf | None) -> None:
+        self._sink.commit()  # a slider that is held goes with its form
         clear(self._column)
         self.form = self.common = None
         if material is None:
             self._column.addWidget(note("The scene has no materials yet."))
             self._column.addStretch(1)
             return
-        self.common = ParamForm(_COMMON, self._sink())
+        self.common = ParamForm(_COMMON, self._sink)
         self._column.addWidget(self.common)
         box = QWidget()
         layout = form_layout(box)
@@ -187,7 +189,7 @@ class MaterialsPanel(Panel):
         layout.addRow(form_label("Kind", "How the surface reflects light"), self._model_combo)
         self._column.addWidget(box)
         if model is not None:
-            self.form = ParamForm(param_infos(model.Params), self._sink())
+            self.form = ParamForm(param_infos(model.Params), self._sink)
             self._column.addWidget(self.form)
             for name in model.textures:
                 self._column.addWidget(
@@ -219,12 +221,6 @@ class MaterialsPanel(Panel):
         return box
 
     # edits
-
-    def _sink(self) -> EditSink:
-        def label(name: str) -> str:
-            return self._make(name, 0.0).label
-
-        return EditSink(self.context.editing, self._make, label)
 
     def _make(self, name: str, value: Value) -> Edit:
         assert self.material is not None

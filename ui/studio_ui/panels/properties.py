@@ -78,6 +78,7 @@ class PropertiesPanel(Panel):
     def __init__(self, context: Context) -> None:
         super().__init__(context)
         self.node: NodeId | None = None
+        self._sink = EditSink(context.editing, self._set, self._label)
         self.form: ParamForm | None = None
         self.position: Triple | None = None
         self.rotation: Triple | None = None
@@ -114,6 +115,7 @@ class PropertiesPanel(Panel):
             self._soon.start(0)
 
     def _build(self, node_id: NodeId | None) -> None:
+        self._sink.commit()
         clear(self._column)
         self.node, self.form = node_id, None
         self.position = self.rotation = self.scale = None
@@ -129,18 +131,15 @@ class PropertiesPanel(Panel):
         self._column.addWidget(heading(kind))
         if len(chosen) > 1:
             self._column.addWidget(note(f"{len(chosen)} chosen; this is the last one."))
-        sink = EditSink(
-            self.context.editing, self._set, lambda name: f"{param_infos(type(node))[name].label}"
-        )
         infos = param_infos(type(node))
-        self.form = ParamForm(infos, sink, skip=("hidden", "locked"))
+        self.form = ParamForm(infos, self._sink, skip=("hidden", "locked"))
         self._column.addWidget(self.form)
         if not isinstance(node, Environment):
             self._place()
         if isinstance(node, MeshObject):
             self._mesh(scene, node)
         flags = {name: infos[name] for name in ("hidden", "locked")}
-        self._flags = ParamForm(flags, sink)
+        self._flags = ParamForm(flags, self._sink)
         self._column.addWidget(self._flags)
         self._column.addStretch(1)
 
@@ -196,9 +195,12 @@ class PropertiesPanel(Panel):
 
     def _set(self, name: str, value: Value) -> Edit:
         assert self.node is not None
+        return SetFields(self.node, {name: value}, self._label(name))
+
+    def _label(self, name: str) -> str:
+        assert self.node is not None
         node = self.context.document.scene[self.node]
-        label = param_infos(type(node))[name].label
-        return SetFields(self.node, {name: value}, f"{label} of {node.name}")
+        return f"{param_infos(type(node))[name].label} of {node.name}"
 
     def _assign(self, slot: int) -> None:
         if self.node is not None:

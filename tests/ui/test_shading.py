@@ -1,0 +1,170 @@
+"""The picture and its making: stale marks, order of events, failures, threads."""
+
+from __future__ import annotations
+
+import threading
+
+import numpy as np
+from ui_support import Driver, Make, room
+
+from studio_core.edits import Move, SetFields, SetMaterial
+from studio_core.scene.transform import Transform
+from studio_ui.feed import Freshness
+
+
+def shift(driver: Driver, x: float) -> None:
+    driver.document.apply(Move({"stool": Transform((x, 0.0, 0.0))}))
+
+
+def test_the_first_picture_is_shown_with_its_numbers(driver: Driver) -> None:
+    assert driver.viewport.freshness is Freshness.CURRENT
+    image = driver.viewport.grab_image()
+    at = driver.at((-1.0, 0.5, 0.5))
+    colour = image.pixelColor(at)
+    assert colour.red() > 2 * colour.green(), "the chair is red"
+    status = driver.window.status
+    assert status.vertices.text() == "8 vertices"
+    assert status.directions.text() == "1,024 directions"
+    assert status.error.text() == "error: not measured"
+    assert status.backend.text()
+
+
+def test_the_old_picture_stays_marked_while_a_new_one_is_made(make: Make) -> None:
+    driver = make(threads=True)
+    driver.show(room())
+    old = driver.feed.last.picture
+    states: list[Freshness] = []
+    driver.feed.freshness.connect(states.append)
+    driver.fake.gate = threading.Event()
+    driver.fake.started.clear()
+    shift(driver, 1.5)
+    driver.until(driver.fake.started.is_set)
+    assert driver.viewport.freshness is Freshness.STALE
+    assert driver.viewport._picture is old
+    driver.fake.gate.set()
+    driver.settle()
+    assert states[0] is Freshness.STALE
+    assert states[-1] is Freshness.CURRENT
+    assert driver.viewport._picture is not old
+    assert driver.viewport.freshness is Freshness.CURRENT
+
+
+def test_an_edit_while_computing_cancels_and_the_newest_is_shown(make: Make) -> None:
+    driver = make(threads=True)
+    driver.show(room())
+    shown: list[tuple[float, float]] = []
+    driver.feed.shown.connect(lambda s: shown.append(float(s.picture.distance.min())))
+    driver.fake.gate = threading.Event()
+    driver.fake.started.clear()
+    shift(driver, 1.5)
+    driver.until(driver.fake.started.is_set)
+    cancelled = driver.feed._scheduler.cancelled_jobs
+    for x in (1.6, 1.7, 1.8):
+        shift(driver, x)
+    driver.until(lambda: driver.feed._scheduler.cancelled_jobs == cancelled + 1)
+    assert shown == [], "what was cancelled is never shown"
+    driver.fake.gate.set()
+    driver.settle()
+    assert driver.fake.frames[-1].scene is driver.document.scene
+    asked = [f.scene.world("stool").translation[0] for f in driver.fake.frames]
+    assert 1.6 not in asked, "what happened meanwhile is asked for once"
+    assert 1.7 not in asked
+
+
+def test_a_change_of_name_computes_nothing(driver: Driver) -> None:
+    count = len(driver.fake.frames)
+    driver.document.apply(SetFields("stool", {"name": "Taboret"}))
+    driver.bot.wait(30)
+    assert len(driver.fake.frames) == count
+    assert driver.feed.state is Freshness.CURRENT
+
+
+def test_many_edits_at_once_are_one_request(driver: Driver) -> None:
+    count = len(driver.fake.frames)
+    for x in np.linspace(1, 2, 20):
+        shift(driver, float(x))
+    driver.settle()
+    assert len(driver.fake.frames) <= count + 2
+
+
+def test_while_dragging_pictures_are_quick_and_at_rest_they_are_fine(driver: Driver) -> None:
+    driver.feed.hold()
+    shift(driver, 1.4)
+    driver.until(lambda: driver.fake.frames[-1].scene is driver.document.scene)
+    view = driver.fake.frames[-1].view
+    assert view.antialias == 1
+    assert view.width * view.height <= 261_000
+    driver.feed.release()
+    driver.settle()
+    view = driver.fake.frames[-1].view
+    assert view.antialias == 2
+    assert (view.width, view.height) == driver.feed.size
+
+
+def test_a_backend_that_fails_is_contained_and_named(driver: Driver) -> None:
+    old = driver.viewport._picture
+    driver.fake.fail = ZeroDivisionError("no light")
+    shift(driver, 1.5)
+    driver.until(lambda: driver.feed.state is Freshness.FAILED)
+    assert driver.viewport._picture is old
+    assert driver.document.scene.world("stool").translation == (1.5, 0.0, 0.0)
+    (told,) = driver.problems()
+    assert "'reference'" in told
+    assert "no light" in told
+    assert driver.window.status.message.text() == told
+    assert any("no light" in failure.what for failure in driver.context.host.failures)
+    driver.fake.fail = None
+    driver.document.apply(SetMaterial("red", {"roughness": 0.9}))
+    driver.settle()
+    assert driver.fake.frames[-1].scene is driver.document.scene
+
+
+def test_a_backend_that_leaves_the_program_is_contained(driver: Driver) -> None:
+    driver.fake.fail = SystemExit(3)
+    shift(driver, 1.5)
+    driver.until(lambda: driver.feed.state is Freshness.FAILED)
+    assert len(driver.problems()) == 1
+    driver.fake.fail = None
+    driver.do("shade.again")
+    driver.settle()
+
+
+def test_a_cancelled_job_leaves_what_is_shown(make: Make) -> None:
+    driver = make(threads=True)
+    driver.show(room())
+    driver.fake.gate = threading.Event()
+    driver.fake.started.clear()
+    shift(driver, 1.5)
+    driver.until(driver.fake.started.is_set)
+    panel = driver.window.panels["jobs"]
+    driver.until(lambda: len(panel.rows) == 1)
+    panel.rows[0].button.click()
+    driver.until(lambda: not driver.feed.busy)
+    assert driver.feed.state is Freshness.FAILED
+    driver.until(lambda: not panel.rows)
+    driver.fake.gate.set()
+    shift(driver, 1.6)
+    driver.settle()
+    assert driver.fake.frames[-1].scene is driver.document.scene
+
+
+def test_exposure_and_view_transform_compute_nothing(driver: Driver) -> None:
+    count = len(driver.fake.frames)
+    at = driver.at((-1.0, 0.5, 0.5))
+    before = driver.viewport.grab_image().pixelColor(at).red()
+    driver.viewport.setFocus()
+    driver.do("view.darker")
+    driver.do("view.darker")
+    assert driver.session.exposure == -1.0
+    assert driver.viewport.grab_image().pixelColor(at).red() < before
+    driver.session.display(tonemap="raw")
+    assert driver.window.view_controls.transform.currentData() == "raw"
+    driver.bot.wait(20)
+    assert len(driver.fake.frames) == count
+
+
+def test_a_smaller_canvas_asks_for_a_smaller_picture(driver: Driver) -> None:
+    driver.window.resize(900, 500)
+    driver.until(lambda: driver.feed.size == (driver.viewport.width(), driver.viewport.height()))
+    driver.settle()
+    assert driver.feed.last.picture.linear.shape[:2] == (driver.viewport.height(), driver.viewport.width())

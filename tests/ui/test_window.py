@@ -1,0 +1,214 @@
+"""The window as a whole: start, layout, actions, many lives."""
+
+from __future__ import annotations
+
+import gc
+import json
+import os
+import subprocess
+import sys
+import threading
+from pathlib import Path
+
+import pytest
+from PySide6.QtCore import QEvent
+from PySide6.QtGui import QKeySequence
+from PySide6.QtWidgets import QApplication, QWidget
+from ui_support import Driver, Make, room
+
+from studio_core.document import Document
+from studio_core.registry import PluginHost
+from studio_ui.actions import ACTIONS, specs
+from studio_ui.dialogs import KeysDialog, PluginsDialog, UnitDialog, likely_unit
+from studio_ui.icons import ICONS, icon
+from studio_ui.theme import THEMES
+
+HEAVY = ("numba", "trimesh", "OpenImageIO", "cv2", "scipy", "embreex", "vispy", "pyqtgraph", "PIL", "mitsuba")
+
+
+def test_the_window_imports_nothing_heavy() -> None:
+    """What takes long to import waits for the compute thread."""
+    code = f"import studio.app, sys; print([m for m in {HEAVY!r} if m in sys.modules])"
+    path = os.pathsep.join(sys.path)
+    ran = subprocess.run(
+        [sys.executable, "-c", code],
+        capture_output=True,
+        text=True,
+        check=True,
+        env={**os.environ, "PYTHONPATH": path},
+    )
+    assert ran.stdout.strip() == "[]"
+
+
+def test_every_action_is_reachable_and_told_apart(driver: Driver) -> None:
+    names = [spec.id for spec in specs()]
+    assert len(set(names)) == len(names)
+    keys = [QKeySequence(spec.shortcut).toString() for spec in specs() if spec.shortcut]
+    assert len(set(keys)) == len(keys)
+    assert "" not in keys
+    assert all(spec.icon in ICONS for spec in specs() if spec.icon)
+    shown = {
+        action.text()
+        for menu in driver.window.actions_.menus.values()
+        for action in menu.actions()
+        if not action.isSeparator()
+    }
+    driver.until(lambda: not driver.window._soon.isActive())
+    for spec in specs():
+        assert driver.window.actions_[spec.id].text() in shown
+    assert None in ACTIONS
+
+
+def test_what_cannot_be_done_is_disabled(make: Make) -> None:
+    driver = make()
+    driver.until(lambda: not driver.window._soon.isActive())
+    enabled = {name: action.isEnabled() for name, action in driver.window.actions_.actions.items()}
+    assert not enabled["edit.undo"]
+    assert not enabled["edit.delete"]
+    assert enabled["file.open"]
+    driver.show(room())
+    driver.session.select(["stool"])
+    driver.do("edit.delete")
+    driver.until(lambda: driver.window.actions_["edit.undo"].text() == "Undo Delete Stool")
+
+
+def test_what_is_gone_is_not_chosen(driver: Driver) -> None:
+    driver.session.select(["stool"])
+    driver.do("edit.delete")
+    driver.do("edit.undo")
+    driver.session.select(["stool"])
+    driver.do("edit.redo")
+    assert driver.session.selection == ()
+
+
+def test_layout_and_theme_are_remembered_and_reset(make: Make, tmp_path: Path) -> None:
+    state = tmp_path / "mine"
+    driver = make(state=state)
+    driver.window.docks["outliner"].hide()
+    driver.do("view.light")
+    driver.close()
+    stored = json.loads((state / "window.json").read_text("utf-8"))
+    assert stored["theme"] == "light"
+    other = make(state=state)
+    assert other.window.docks["outliner"].isHidden()
+    assert other.window.actions_["view.light"].isChecked()
+    other.do("window.reset")
+    assert not other.window.docks["outliner"].isHidden()
+    other.do("view.dark")
+
+
+def test_a_damaged_state_file_is_as_good_as_none(make: Make, tmp_path: Path) -> None:
+    state = tmp_path / "mine"
+    state.mkdir()
+    (state / "window.json").write_text('{"layout": 7, "recent": "x", "theme": ["dark"], "geometry": "///"}')
+    driver = make(state=state)
+    driver.show(room())
+    assert driver.window.settings.recent == []
+
+
+def test_twenty_lives_leave_nothing_behind(make: Make, qapp: QApplication) -> None:
+    def count() -> tuple[int, int, int]:
+        gc.collect()
+        qapp.sendPostedEvents(None, QEvent.Type.DeferredDelete)
+        documents = sum(isinstance(found, Document) for found in gc.get_objects())
+        return threading.active_count(), len(qapp.allWidgets()), documents
+
+    def live() -> None:
+        driver = make(threads=True)
+        driver.show(room())
+        driver.session.select(["stool"])
+        driver.do("object.right")
+        driver.settle()
+        driver.close()
+        driver.forget()
+
+    live()
+    live()
+    before = count()
+    for _ in range(20):
+        live()
+    after = count()
+    assert after[0] == before[0]
+    assert after[1] <= before[1]
+    assert after[2] <= before[2]
+
+
+def test_two_windows_do_not_share_anything(make: Make, tmp_path: Path) -> None:
+    one, other = make(state=tmp_path / "a"), make(state=tmp_path / "b")
+    one.show(room())
+    one.session.select(["stool"])
+    assert other.document.scene.nodes == {}
+    assert other.session.selection == ()
+    assert other.feed.last is None or other.feed.last.picture.nodes == ()
+
+
+def test_a_closed_window_lets_late_results_go(make: Make) -> None:
+    driver = make(threads=True)
+    driver.show(room())
+    driver.fake.gate = threading.Event()
+    driver.fake.started.clear()
+    driver.session.select(["stool"])
+    driver.do("object.right")
+    driver.until(driver.fake.started.is_set)
+    driver.window.close()
+    driver.close()
+    QApplication.processEvents()
+    assert driver.problems() == []
+
+
+def test_dialogs_show_what_they_are_for(make: Make) -> None:
+    driver = make()
+    host = PluginHost()
+    host.report("odd", "brdf 'x' failed to load", ValueError("no such thing"))
+    plugins = PluginsDialog(driver.window, host)
+    plugins.tree.setCurrentItem(plugins.tree.topLevelItem(0))
+    assert "no such thing" in plugins.detail.toPlainText()
+    unit = UnitDialog(driver.window, "chair.obj", (45.0, 50.0, 90.0), "?")
+    assert unit.chosen() == 0.01
+    assert KeysDialog(driver.window, [("Undo", "Ctrl+Z")]).windowTitle()
+    assert likely_unit((900.0, 400.0, 700.0)) == 0.001
+    assert likely_unit((1.2, 0.4, 0.7)) == 1.0
+
+
+@pytest.mark.parametrize("name", sorted(ICONS))
+def test_icons_have_strokes(name: str, qapp: QApplication) -> None:
+    image = icon(name, "#ffffff").pixmap(24, 24).toImage()
+    assert any(image.pixelColor(x, y).alpha() > 128 for x in range(24) for y in range(24))
+
+
+@pytest.mark.parametrize("name", sorted(THEMES))
+def test_text_can_be_read_on_every_ground(name: str) -> None:
+    """WCAG contrast: 4.5 for text, 3 for dimmed text."""
+    from studio_core.params import parse_colour
+
+    theme = THEMES[name]
+
+    def light(colour: str) -> float:
+        red, green, blue = parse_colour("colour", colour)
+        return 0.2126 * red + 0.7152 * green + 0.0722 * blue
+
+    def contrast(a: str, b: str) -> float:
+        bright, dark = sorted((light(a), light(b)), reverse=True)
+        return (bright + 0.05) / (dark + 0.05)
+
+    for ground in (theme.window, theme.base, theme.raised):
+        assert contrast(theme.text, ground) >= 4.5
+        assert contrast(theme.dim, ground) >= 3
+        assert contrast(theme.problem, ground) >= 3
+    assert contrast(theme.on_accent, theme.accent) >= 3
+
+
+def test_help_and_lists_open(driver: Driver) -> None:
+    for action in ("help.keys", "help.plugins"):
+        driver.do(action)
+    opened = [w for w in driver.window.findChildren(QWidget) if w.isWindow() and w.isVisible()]
+    assert len(opened) == 2
+    for dialog in opened:
+        dialog.close()
+    driver.window._fill_recent()
+    driver.window._fill_cameras()
+    assert driver.window._camera_menu.actions()[0].text() == "None yet"
+    driver.do("view.new_camera")
+    driver.window._fill_cameras()
+    assert driver.window._camera_menu.actions()[0].text() == "Camera"
+    assert driver.window.view_controls.camera.currentText() == "Camera"

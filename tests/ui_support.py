@@ -1,0 +1,249 @@
+"""A window over a quick stand-in for shading: boxes seen by slab tests, coloured by their material."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+from PySide6.QtCore import QPoint, Qt
+from pytestqt.qtbot import QtBot
+
+from studio.app import Studio
+from studio_core.document import Step
+from studio_core.edits import Add
+from studio_core.project.recovery import Recovery
+from studio_core.scene.diff import Aspect
+from studio_core.scene.geometry import Geometry
+from studio_core.scene.nodes import Group, Material, MeshObject, Scene
+from studio_core.scene.transform import Transform, looking
+from studio_core.session import View
+from studio_core.shading.artifacts import Picture
+from studio_core.shading.frame import Frame
+from studio_core.shading.job import Job
+from studio_core.shading.pipeline import Inputs, Pipeline
+from studio_ui.ask import Filter, Recover, Unsaved
+from studio_ui.canvas.projection import axes_of, extent, eye_of, project
+from studio_ui.feed import Freshness
+
+
+def box(size: float = 1.0) -> Geometry:
+    """A cube on the floor, centred in x and z."""
+    corners = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (0, 1) for z in (-0.5, 0.5)], np.float32)
+    faces = [[0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1]]
+    faces += [[2, 3, 7], [2, 7, 6], [0, 2, 6], [0, 6, 4], [1, 5, 7], [1, 7, 3]]
+    return Geometry(corners * np.float32(size), np.array(faces, np.uint32))
+
+
+def room() -> Scene:
+    """A chair (a group of seat and back) and a stool, apart in x; two materials."""
+    cube = box()
+    red = Material(
+        id="red", name="Red", model="ggx", values={"base_color": (0.6, 0.1, 0.1), "roughness": 0.5}
+    )
+    blue = Material(id="blue", name="Blue", model="lambert")
+    return Add(
+        (
+            Group(id="chair", name="Chair", transform=Transform((-1.0, 0.0, 0.0))),
+            MeshObject(id="seat", name="Seat", parent="chair", geometry=cube, materials=("red",)),
+            MeshObject(
+                id="back",
+                name="Back",
+                parent="chair",
+                geometry=cube,
+                materials=("red",),
+                transform=Transform((0.0, 1.0, 0.0), scale=0.5),
+            ),
+            MeshObject(
+                id="stool", name="Stool", geometry=cube, materials=("blue",), transform=Transform((1.0, 0, 0))
+            ),
+        ),
+        (red, blue),
+    )(Scene())
+
+
+def see(scene: Scene, view: View) -> Picture:
+    """The picture of axis-aligned boxes."""
+    x = (np.arange(view.width) + 0.5) / view.width
+    y = (np.arange(view.height) + 0.5) / view.height
+    right, top = extent(view)
+    grid = np.stack(np.broadcast_arrays((2 * x - 1)[None] * right, (1 - 2 * y)[:, None] * top, -1.0), axis=-1)
+    towards = grid @ axes_of(view)
+    towards /= np.linalg.norm(towards, axis=-1, keepdims=True)
+    nodes = [node for node in scene.of(MeshObject) if scene.shown(node.id)]
+    nearest = np.full((view.height, view.width), np.inf)
+    index = np.full((view.height, view.width), -1, np.int32)
+    linear = np.full((view.height, view.width, 3), 0.05, np.float32)
+    for number, node in enumerate(nodes):
+        world = scene.world(node.id).matrix()
+        low, high = (world[:3, :3] @ corner + world[:3, 3] for corner in node.geometry.bounds)
+        low, high = np.minimum(low, high), np.maximum(low, high)
+        with np.errstate(divide="ignore"):
+            a, b = (low - eye_of(view)) / towards, (high - eye_of(view)) / towards
+        enter, leave = np.minimum(a, b).max(axis=-1), np.maximum(a, b).min(axis=-1)
+        hit = (enter <= leave) & (leave > 0) & (enter < nearest)
+        nearest[hit], index[hit] = enter[hit], number
+        material = scene.material(node.materials[0])
+        linear[hit] = material.values.get("base_color", (0.5, 0.5, 0.5))
+    radiance: Any = SimpleNamespace(
+        surfaces=SimpleNamespace(nodes=tuple(n.id for n in nodes)), valid=np.ones(8, bool), directions=1024
+    )
+    covered = (index >= 0).astype(np.float32)
+    return Picture(radiance, linear, covered, index, nearest.astype(np.float32))
+
+
+class Fake:
+    """A stage and a `Shading` at once: counts, can wait at a gate, can fail."""
+
+    needs: tuple[type, ...] = ()
+    gives = Picture
+    dirtied_by = ~(Aspect.NAME | Aspect.NONE)
+
+    def __init__(self) -> None:
+        self.frames: list[Frame] = []
+        self.fail: BaseException | None = None
+        self.gate: threading.Event | None = None
+        self.started = threading.Event()
+
+    def run(self, frame: Frame, inputs: Inputs, job: Job) -> Picture:
+        self.frames.append(frame)
+        self.started.set()
+        if self.gate is not None:
+            while not self.gate.wait(0.002):
+                job.checkpoint(1, 2)
+        if self.fail is not None:
+            raise self.fail
+        return see(frame.scene, frame.view)
+
+    def pipeline(self, backend: str) -> Pipeline:
+        return Pipeline([self])
+
+    def params(self, backend: str, values: Mapping[str, Any]) -> Any:
+        return dict(values)
+
+
+@dataclass
+class Answers:
+    """Answers to every question, and which were asked."""
+
+    unsaved_: Unsaved = "discard"
+    recover_: Recover = "recovered"
+    read_only_: bool = True
+    unit_: float | None = 1.0
+    files: list[Path] = field(default_factory=list)
+    target: Path | None = None
+    asked: list[str] = field(default_factory=list)
+
+    def unsaved(self, name: str) -> Unsaved:
+        self.asked.append("unsaved")
+        return self.unsaved_
+
+    def recover(self, found: Recovery) -> Recover:
+        self.asked.append("recover")
+        return self.recover_
+
+    def read_only(self, problem: str) -> bool:
+        self.asked.append(problem)
+        return self.read_only_
+
+    def unit(self, name: str, size: tuple[float, float, float], question: str) -> float | None:
+        self.asked.append(question)
+        return self.unit_
+
+    def open_files(self, title: str, filters: Sequence[Filter], *, many: bool = False) -> list[Path]:
+        return self.files
+
+    def save_file(self, title: str, suggested: Path, filters: Sequence[Filter]) -> Path | None:
+        return self.target
+
+    def folder(self, title: str) -> Path | None:
+        return self.target
+
+
+class Driver:
+    """A studio under test: what a person would do with it."""
+
+    def __init__(self, studio: Studio, fake: Fake, answers: Answers, bot: QtBot) -> None:
+        self.studio, self.fake, self.answers, self.bot = studio, fake, answers, bot
+        self.window, self.context = studio.window, studio.context
+        self.document, self.session, self.feed = (
+            self.context.document,
+            self.context.session,
+            self.context.feed,
+        )
+        self.viewport: Any = self.window.viewport
+        self._closed = False
+        self.window.resize(1100, 700)
+        self.window.show()
+
+    def show(self, scene: Scene) -> None:
+        """Put a scene on the screen, looked at from the front."""
+        self.document.restore((Step("Open", scene),), 0)
+        view = self.session.view
+        place = looking((0.0, 2.5, 7.0), (0.0, 0.6, 0.0))
+        self.session.look(View(place, 40.0, view.width, view.height, 7.2))
+        self.settle()
+
+    def settle(self) -> None:
+        """Until the picture is up to date."""
+        self.until(lambda: self.feed.state is Freshness.CURRENT and not self.feed.busy)
+
+    def until(self, what: Callable[[], bool]) -> None:
+        self.bot.waitUntil(what, timeout=20_000)
+
+    def idle(self) -> None:
+        """Until queued calls have run."""
+        self.until(lambda: not self.context.tasks.running)
+
+    def at(self, point: Sequence[float]) -> QPoint:
+        """Where a point of the world is on the canvas."""
+        x, y = project(self.session.view, [point])[0]
+        return QPoint(round(x * self.viewport.width()), round(y * self.viewport.height()))
+
+    def click(
+        self, point: Sequence[float], keys: Qt.KeyboardModifier = Qt.KeyboardModifier.NoModifier
+    ) -> None:
+        self.bot.mouseClick(self.viewport, Qt.MouseButton.LeftButton, keys, self.at(point))
+
+    def press(
+        self, at: QPoint, keys: Qt.KeyboardModifier = Qt.KeyboardModifier.NoModifier, button: Any = None
+    ) -> None:
+        self.bot.mousePress(self.viewport, button or Qt.MouseButton.LeftButton, keys, at)
+
+    def move(self, at: QPoint) -> None:
+        self.bot.mouseMove(self.viewport, at)
+
+    def release(
+        self, at: QPoint, keys: Qt.KeyboardModifier = Qt.KeyboardModifier.NoModifier, button: Any = None
+    ) -> None:
+        self.bot.mouseRelease(self.viewport, button or Qt.MouseButton.LeftButton, keys, at)
+
+    def do(self, action: str) -> None:
+        """Trigger an action as its menu does."""
+        self.bot.waitUntil(lambda: not self.window._soon.isActive(), timeout=5000)
+        assert self.window.actions_[action].isEnabled(), action
+        self.window.actions_[action].trigger()
+
+    def problems(self) -> list[str]:
+        return [entry.text for entry in self.context.journal.entries if entry.level == "problem"]
+
+    def labels(self) -> list[str]:
+        return [step.label for step in self.document.history]
+
+    def close(self) -> None:
+        if not self._closed:
+            self._closed = True
+            if self.fake.gate is not None:
+                self.fake.gate.set()
+            self.studio.close()
+
+    def forget(self) -> None:
+        """After `close`: hold on to nothing."""
+        self.__dict__ = {"_closed": True}
+
+
+Make = Callable[..., Driver]
