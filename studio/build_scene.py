@@ -38,7 +38,7 @@ class MeshRequest:
     def parse(cls, text: str) -> MeshRequest:
         """From the command line's text; a file may have @ in its name as long as numbers follow the last."""
         path, at, numbers = text.rpartition("@")
-        if not at or Path(text).is_file():
+        if not at or _is_file(text):
             return cls(Path(text), Transform())
         parts = _numbers("--mesh", text, numbers)
         if not 3 <= len(parts) <= 5:
@@ -50,6 +50,13 @@ class MeshRequest:
             raise InputError(f"--mesh {text!r}: expected a scale from {SMALLEST:g} to {LARGEST:g}")
         _check_place("--mesh", text, place)
         return cls(Path(path), Transform(place, axis_angle((0, 1, 0), degrees), scale))
+
+
+def _is_file(text: str) -> bool:
+    try:
+        return Path(text).is_file()
+    except (OSError, ValueError):  # too long, or with a null
+        return False
 
 
 def _numbers(option: str, text: str, numbers: str) -> list[float]:

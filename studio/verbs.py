@@ -346,6 +346,7 @@ def demo(options: argparse.Namespace, program: Headless) -> int:
     if options.out is None:
         options.out = Path("living-room.png")
     _check_picture(options)
+    chosen_backend(options, program)
     program.say(f"Rendering the sample room to {options.out.resolve()} ({reason})")
     render(options, program)
     return 0
