@@ -21,6 +21,9 @@ from studio_core.parallel import Workers
 from studio_core.params import build
 from studio_core.registry import PluginHost
 from studio_core.session import Session
+from studio_core.shading.artifacts import MeasuredError
+from studio_core.shading.frame import Frame
+from studio_core.shading.job import Job
 from studio_core.shading.pipeline import Pipeline
 from studio_core.shading.scheduler import ComputeThread, Executor
 from studio_ui.ask import Ask
@@ -47,6 +50,12 @@ class PluginShading:
 
         found: ShadingBackend = self._services.registry.get("backend", backend)
         return Pipeline([*found.stages(self._services), PictureStage(self._services)])
+
+    def measure(self, pipeline: Pipeline, frame: Frame, job: Job) -> MeasuredError | None:
+        """The error of what the pipeline last made."""
+        from studio_core.shading.error_meter import ErrorMeter
+
+        return ErrorMeter(self._services)(pipeline, frame, job)
 
     def params(self, backend: str, values: Mapping[str, Any]) -> Any:
         """The backend's parameters, checked."""

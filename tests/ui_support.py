@@ -22,7 +22,7 @@ from studio_core.scene.geometry import Geometry
 from studio_core.scene.nodes import Group, Material, MeshObject, Scene
 from studio_core.scene.transform import Transform, looking
 from studio_core.session import View
-from studio_core.shading.artifacts import Picture
+from studio_core.shading.artifacts import MeasuredError, Picture
 from studio_core.shading.frame import Frame
 from studio_core.shading.job import Job
 from studio_core.shading.pipeline import Inputs, Pipeline
@@ -108,6 +108,8 @@ class Fake:
         self.fail: BaseException | None = None
         self.gate: threading.Event | None = None
         self.started = threading.Event()
+        self.measured = 0
+        self.error: MeasuredError | None = None
 
     def run(self, frame: Frame, inputs: Inputs, job: Job) -> Picture:
         self.frames.append(frame)
@@ -124,6 +126,10 @@ class Fake:
 
     def params(self, backend: str, values: Mapping[str, Any]) -> Any:
         return dict(values)
+
+    def measure(self, pipeline: Pipeline, frame: Frame, job: Job) -> MeasuredError | None:
+        self.measured += 1
+        return self.error
 
 
 @dataclass

@@ -5,6 +5,7 @@ V shading vertices, F faces, M materials, S directions, N picture samples.
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, TypeAlias, Union
@@ -198,14 +199,41 @@ class Picture:
         return self.radiance.surfaces.nodes
 
 
+@dataclass(frozen=True)
+class Error:
+    """sqrt(mean((shown − true)²)) / mean(true), its standard error, and how many places were looked at."""
+
+    relative_rmse: float
+    uncertainty: float
+    places: int
+
+    def __str__(self) -> str:
+        return f"{100 * self.relative_rmse:.1f} ± {100 * self.uncertainty:.1f} %"
+
+
+@dataclass(frozen=True)
+class MeasuredError:
+    """Errors of a picture and of its vertices, in all and by light layer."""
+
+    picture: Error
+    vertices: Error
+    layers: Mapping[NodeId, Error] = field(default_factory=dict)
+
+    def as_dict(self) -> dict[str, object]:
+        """For --json."""
+        return dataclasses.asdict(self)
+
+
 __all__ = [
     "TERMS",
     "Casters",
     "ChosenPoints",
+    "Error",
     "Hits",
     "Lamp",
     "LayerRadiance",
     "Lighting",
+    "MeasuredError",
     "Picture",
     "Radiance",
     "ShadingPoints",

@@ -8,8 +8,6 @@ the *vertices* (at random shown vertices: what the backend does alone).
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
-from dataclasses import dataclass, field
 
 import numpy as np
 import numpy.typing as npt
@@ -23,9 +21,11 @@ from studio_core.shading.artifacts import (
     TERMS,
     Casters,
     ChosenPoints,
+    Error,
     Hits,
     LayerRadiance,
     Lighting,
+    MeasuredError,
     Radiance,
     ShadingPoints,
     Shapes,
@@ -42,31 +42,6 @@ F64 = npt.NDArray[np.float64]
 LEVEL = 15
 LAMP_SAMPLES = 256
 RESAMPLINGS = 200
-
-
-@dataclass(frozen=True)
-class Error:
-    """sqrt(mean((shown − true)²)) / mean(true), its standard error, and how many places were looked at."""
-
-    relative_rmse: float
-    uncertainty: float
-    places: int
-
-    def __str__(self) -> str:
-        return f"{100 * self.relative_rmse:.1f} ± {100 * self.uncertainty:.1f} %"
-
-
-@dataclass(frozen=True)
-class MeasuredError:
-    """Errors of a picture and of its vertices, in all and by light layer."""
-
-    picture: Error
-    vertices: Error
-    layers: Mapping[NodeId, Error] = field(default_factory=dict)
-
-    def as_dict(self) -> dict[str, object]:
-        """For --json."""
-        return dataclasses.asdict(self)
 
 
 def compare(shown: npt.ArrayLike, true: npt.ArrayLike, seed: int = 0) -> Error:

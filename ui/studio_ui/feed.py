@@ -17,7 +17,7 @@ from studio_core.document import Document
 from studio_core.scene.diff import Aspect, Changes, everything, view_changed
 from studio_core.scene.nodes import Scene
 from studio_core.session import Session, View
-from studio_core.shading.artifacts import Picture
+from studio_core.shading.artifacts import MeasuredError, Picture
 from studio_core.shading.frame import Frame
 from studio_core.shading.job import Job
 from studio_core.shading.pipeline import Pipeline
@@ -63,6 +63,10 @@ class Shading(Protocol):
         """The backend's parameters."""
         ...
 
+    def measure(self, pipeline: Pipeline, frame: Frame, job: Job) -> MeasuredError | None:
+        """How wrong the pipeline's last picture is."""
+        ...
+
 
 class LazyPipeline:
     """A pipeline that is made when the compute thread first needs it."""
@@ -99,9 +103,16 @@ class LazyPipeline:
         params = self._shading.params(self._backend, frame.params)
         return self._made.update(dataclasses.replace(frame, params=params), changes, job)
 
+    def measure(self, frame: Frame, job: Job) -> MeasuredError | None:
+        """The error of what was last made; see `Shading.measure`."""
+        return self._shading.measure(self._made, frame, job) if self._made is not None else None
+
 
 class PictureFeed:
-    """`shown`, `freshness`, `failed` and `progress` are emitted on the window's thread."""
+    """`shown`, `freshness`, `measured`, `failed` and `progress` are emitted on the window's thread.
+
+    `measured` gives the error of the picture that is shown, and None as soon as another one is.
+    """
 
     def __init__(
         self,
@@ -114,6 +125,7 @@ class PictureFeed:
     ) -> None:
         self.shown: Signal[[Shown]] = Signal()
         self.freshness: Signal[[Freshness]] = Signal()
+        self.measured: Signal[[MeasuredError | None]] = Signal()
         self.failed: Signal[[Exception]] = Signal()
         self.progress: Signal[[Job]] = Signal()
         self.state = Freshness.NONE
@@ -136,7 +148,7 @@ class PictureFeed:
     @property
     def busy(self) -> bool:
         """Whether a picture is being made or waits to be asked for."""
-        return self._scheduler.busy or self._queued or bool(self._changes)
+        return self._scheduler.busy or self._queued or (bool(self._changes) and self.last is not None)
 
     @property
     def job(self) -> Job | None:
@@ -169,6 +181,12 @@ class PictureFeed:
         """A single step of looking around (wheel, key, resize)."""
         self._until = time.monotonic() + REST_MS / 1000
         self._later(REST_MS + 20, self._rest)
+
+    def forget(self) -> None:
+        """Another project: the first picture of it should come quickly."""
+        self.last = None
+        self._tell(Freshness.NONE)
+        self.restart()
 
     def restart(self) -> None:
         """Ask for everything again."""
@@ -210,12 +228,22 @@ class PictureFeed:
 
     def _schedule(self) -> Scheduler:
         pipeline: Any = LazyPipeline(self._shading, self._backend)
-        scheduler = Scheduler(pipeline, self._executor, self._post)
+        scheduler = Scheduler(pipeline, self._executor, self._post, spare=self._spare)
         scheduler.shown.connect(self._show)
         scheduler.failed.connect(self._fail)
         scheduler.progress.connect(self.progress.emit)
         scheduler.idle.connect(self._idle)
+        scheduler.measured.connect(self._measured)
         return scheduler
+
+    def _spare(self, pipeline: Any, frame: Frame, job: Job) -> MeasuredError | None:
+        """On the compute thread: nothing is measured while somebody drags or looks around."""
+        found: MeasuredError | None = None if self.moving else pipeline.measure(frame, job)
+        return found
+
+    def _measured(self, frame: Frame, error: MeasuredError | None) -> None:
+        if self.last is not None and self.last.view == frame.view:
+            self.measured.emit(error)
 
     def _edited(self, before: Scene, after: Scene, changes: Changes) -> None:
         if changes.aspects & ~Aspect.NAME:
@@ -235,11 +263,14 @@ class PictureFeed:
         self._queued = False
         if self._closed or not self._changes:
             return
+        if self.last is None and not self._document.scene.nodes:
+            return  # there is nothing to see; the changes are kept
         if self.moving and self._scheduler.busy and not self._answered:
             return  # let one picture be seen before asking for the next
         changes, self._changes = self._changes, Changes()
         self._answered = False
-        frame = Frame(self._document.scene, self.frame_view(self.moving), self._session.params)
+        quick = self.moving or self.last is None
+        frame = Frame(self._document.scene, self.frame_view(quick), self._session.params)
         asked, finer_only, self._finer_only = time.monotonic(), self._finer_only, True
         revision = self._revision = self._revision + 1  # as the scheduler counts
         self._asked[revision] = asked
@@ -267,12 +298,15 @@ class PictureFeed:
         self._asked = {r: t for r, t in self._asked.items() if r >= frame.revision}
         self.last = Shown(picture, frame.view, final, time.monotonic() - asked)
         self.shown.emit(self.last)
+        self.measured.emit(None)
         if frame.revision < self._outdated or (self._changes and not self._finer_only):
             self._tell(Freshness.STALE)
         else:
             waits = bool(self._changes) or any(r > frame.revision for r in self._asked)
             finer = waits or not final or self._coarse(frame.view)
             self._tell(Freshness.REFINING if finer else Freshness.CURRENT)
+        if self._coarse(frame.view) and not self.moving and not self._changes:
+            self._later(0, self._rest)
         self._again()
 
     def _fail(self, frame: Frame, error: Exception) -> None:

@@ -24,6 +24,7 @@ from studio_core import __version__
 from studio_core.errors import LucarneError
 from studio_core.scene.diff import Changes
 from studio_core.scene.nodes import Camera, Scene
+from studio_core.shading.artifacts import MeasuredError
 from studio_core.shading.scheduler import Executor
 from studio_ui.actions import MOUSE, ActionSet, specs
 from studio_ui.ask import Ask
@@ -33,13 +34,14 @@ from studio_ui.commands import Commands
 from studio_ui.context import Context, Subscriptions
 from studio_ui.dialogs import Dialogs, KeysDialog, PluginsDialog
 from studio_ui.feed import Shown
+from studio_ui.hint_bar import HintBar
 from studio_ui.panels.history import HistoryPanel
 from studio_ui.panels.jobs import JobsPanel
 from studio_ui.panels.lighting import LightingPanel
 from studio_ui.panels.log import LogPanel
 from studio_ui.panels.materials import MaterialsPanel
 from studio_ui.panels.outliner import OutlinerPanel
-from studio_ui.panels.panel import Panel
+from studio_ui.panels.panel import Panel, stacked
 from studio_ui.panels.properties import PropertiesPanel
 from studio_ui.panels.shading import ShadingPanel
 from studio_ui.project_files import PROJECTS, SUFFIX, ProjectFiles
@@ -84,7 +86,8 @@ class MainWindow(QMainWindow):
         self.docks: dict[str, QDockWidget] = {}
         self.setAcceptDrops(True)
         self.setDockNestingEnabled(True)
-        self.setCentralWidget(viewport.widget)
+        self.hints = HintBar(context, settings)
+        self.setCentralWidget(stacked(self.hints, viewport.widget))
         self.setStatusBar(self.status)
         self.actions_ = ActionSet(self, viewport.widget, self._handlers(), self._conditions())
         self._make_docks()
@@ -216,6 +219,7 @@ class MainWindow(QMainWindow):
             context.feed.shown.connect(self._shown),
             context.feed.freshness.connect(self._freshness),
             context.feed.failed.connect(self._failed),
+            context.feed.measured.connect(self._measured),
             context.journal.added.connect(self.status.tell),
             context.warmed.connect(self._backend),
             self.files.changed.connect(self._title),
@@ -271,6 +275,10 @@ class MainWindow(QMainWindow):
         self.status.show_picture(shown)
         self._refresh_soon()
 
+    def _measured(self, error: MeasuredError | None) -> None:
+        names = {node.id: node.name for node in self.context.document.scene.nodes.values()}
+        self.status.show_error(error, names)
+
     def _freshness(self, state: object) -> None:
         self.viewport.set_freshness(self.context.feed.state)
         self.status.show_freshness(self.context.feed.state)
@@ -298,9 +306,7 @@ class MainWindow(QMainWindow):
 
     def _opened(self) -> None:
         self.viewport.set_picture(None, None)
-        self.context.feed.last = None
-        self.context.feed.step()
-        self.context.feed.restart()
+        self.context.feed.forget()
         self.tools.entered = None
         self._greet()
 
@@ -327,6 +333,7 @@ class MainWindow(QMainWindow):
         self.actions_.set_theme(theme)
         self.actions_[f"view.{theme.name}"].setChecked(True)
         self.viewport.set_theme(theme)
+        self.hints.set_theme(theme)
         for panel in self.panels.values():
             panel.set_theme(theme)
 
@@ -436,5 +443,6 @@ class MainWindow(QMainWindow):
         self.files.close()
         self._subscriptions.close()
         self.view_controls.close_panel()
+        self.hints.close_panel()
         for panel in self.panels.values():
             panel.close_panel()

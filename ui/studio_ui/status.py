@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 
 from PySide6.QtCore import QTimer
 from PySide6.QtWidgets import QLabel, QStatusBar
 
 from studio_core.scene.nodes import Scene
+from studio_core.shading.artifacts import MeasuredError
 from studio_ui.canvas.viewport import Probe
 from studio_ui.feed import Freshness, Shown
 from studio_ui.journal import Entry
 
 _SHOWN_MS = 9000
+_ERROR = "Relative error of the picture against brute force, measured at random places while nothing moves"
 
 
 class StatusBar(QStatusBar):
@@ -29,7 +32,7 @@ class StatusBar(QStatusBar):
         self.directions = QLabel()
         self.time = QLabel()
         self.error = QLabel("error: not measured")
-        self.error.setToolTip("Relative error of the picture against brute force")
+        self.error.setToolTip(_ERROR)
         self.vertices.setToolTip("Points that were lit, of all shading vertices")
         self.directions.setToolTip("Directions that light came from")
         self.time.setToolTip("From the change to this picture")
@@ -69,6 +72,17 @@ class StatusBar(QStatusBar):
     def show_freshness(self, state: Freshness) -> None:
         """How the picture stands to the scene."""
         self.time.setToolTip(f"From the change to this picture ({state.value})")
+
+    def show_error(self, error: MeasuredError | None, names: Mapping[str, str]) -> None:
+        """How wrong the picture is; its layers by the lights' names in the tooltip."""
+        if error is None:
+            self.error.setText("error: not measured")
+            self.error.setToolTip(_ERROR)
+            return
+        self.error.setText(f"error: {error.picture}")
+        lines = [_ERROR, f"of the lit points alone: {error.vertices}"]
+        lines += [f"{names.get(layer, layer)}: {part}" for layer, part in error.layers.items()]
+        self.error.setToolTip("\n".join(lines))
 
     def show_probe(self, probe: Probe | None, scene: Scene) -> None:
         """What is under the mouse."""

@@ -129,6 +129,7 @@ QScrollBar::add-page, QScrollBar::sub-page { background: transparent; }
 QGroupBox { border: none; border-top: 1px solid $border; margin-top: 14px; padding-top: 6px;
     font-weight: 600; }
 QGroupBox::title { subcontrol-origin: margin; left: 0; color: $dim; }
+QFrame#hints { background: $raised; border: none; border-bottom: 1px solid $border; }
 QLabel[role="dim"] { color: $dim; }
 QLabel[role="warning"] { color: $warning; }
 QLabel[role="problem"] { color: $problem; }

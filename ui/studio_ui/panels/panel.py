@@ -73,6 +73,17 @@ def row(*widgets: QWidget, stretch: int = -1) -> QHBoxLayout:
     return layout
 
 
+def stacked(*widgets: QWidget) -> QWidget:
+    """Widgets one above the other, without gaps; the last takes the room."""
+    made = QWidget()
+    layout = QVBoxLayout(made)
+    layout.setContentsMargins(0, 0, 0, 0)
+    layout.setSpacing(0)
+    for widget in widgets:
+        layout.addWidget(widget, 1 if widget is widgets[-1] else 0)
+    return made
+
+
 def heading(text: str) -> QLabel:
     """A title inside a panel."""
     label = QLabel(text)

@@ -1,0 +1,74 @@
+"""Three things to try on the first start; each is ticked off when it was done."""
+
+from __future__ import annotations
+
+from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QToolButton
+
+from studio_core.scene.diff import Aspect, Changes
+from studio_core.scene.nodes import Scene
+from studio_ui.context import Context, Subscriptions
+from studio_ui.icons import icon
+from studio_ui.settings import Settings
+from studio_ui.theme import Theme
+
+STEPS = (
+    (Aspect.TRANSFORM, "Click a chair, then drag it"),
+    (Aspect.LIGHT, "Shift+right-drag turns the light"),
+    (Aspect.MATERIAL, "Change a colour under Materials"),
+)
+
+
+class HintBar(QFrame):
+    """Above the picture, until everything was tried or it is closed; then never again."""
+
+    def __init__(self, context: Context, settings: Settings) -> None:
+        super().__init__()
+        self.setObjectName("hints")
+        self._settings = settings
+        self._done: set[Aspect] = set()
+        self._labels = [QLabel() for _ in STEPS]
+        layout = QHBoxLayout(self)
+        layout.setContentsMargins(12, 3, 6, 3)
+        layout.setSpacing(22)
+        for label in self._labels:
+            layout.addWidget(label)
+        layout.addStretch(1)
+        self._close = QToolButton()
+        self._close.setAutoRaise(True)
+        self._close.setToolTip("Close the hints")
+        self._close.clicked.connect(self.dismiss)
+        layout.addWidget(self._close)
+        self._subscriptions = Subscriptions()
+        self._subscriptions.add(context.editing.document.changed.connect(self._edited))
+        self._write()
+        self.setVisible(not settings.get("hinted", False))
+
+    def dismiss(self) -> None:
+        """Never show them again."""
+        self._settings.set("hinted", True)
+        self.hide()
+
+    def close_panel(self) -> None:
+        """Stop listening."""
+        self._subscriptions.close()
+
+    def set_theme(self, theme: Theme) -> None:
+        """The icon in the theme's colour."""
+        self._close.setIcon(icon("cancel", theme.dim))
+
+    def _edited(self, before: Scene, after: Scene, changes: Changes) -> None:
+        if not before.nodes or changes.aspects & Aspect.STRUCTURE:
+            return  # another project, or something new in this one
+        done = {aspect for aspect, _ in STEPS if changes.aspects & aspect}
+        if done - self._done:
+            self._done |= done
+            self._write()
+            if len(self._done) == len(STEPS):
+                self.dismiss()
+
+    def _write(self) -> None:
+        for number, (label, (aspect, text)) in enumerate(zip(self._labels, STEPS, strict=True), 1):
+            label.setText(f"✓  {text}" if aspect in self._done else f"{number}  {text}")
+            label.setProperty("role", "dim" if aspect in self._done else "")
+            label.style().unpolish(label)
+            label.style().polish(label)
