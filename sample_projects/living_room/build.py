@@ -33,12 +33,12 @@ def build(light_height: int = 512) -> Scene:
 def furnish(stage: Stage) -> None:
     """Puts everything but cameras and the light of the day on the stage."""
     width, depth = HIGH[0] - LOW[0], HIGH[2] - LOW[2]
-    room = stage.group("Room")
+    room = stage.group("Room", locked=True)
     rug_size, rug_place = (2.5, 1.75), placed(-0.72, -0.72, 4.0)
     stage.put([decor.floor(width, depth, TILE, rug_place, rug_size)], room)
     board = Part("Skirting board", decor.skirting(width), ("painted wood",))
     stage.put([board], room, placed(0.0, LOW[2]))
-    stage.put([decor.rug(*rug_size)], room, rug_place)
+    stage.put([decor.rug(*rug_size)], None, rug_place)
     stage.put(seating.sofa(), stage.group("Sofa", placed(-0.85, -1.85)))
     stage.put(seating.armchair(), stage.group("Armchair", placed(0.86, -1.3, -38.0)))
     coffee = stage.group("Coffee table", placed(-0.72, -0.72, 3.0))
@@ -50,10 +50,8 @@ def furnish(stage: Stage) -> None:
     stage.put([tables.bowl(), tables.fruit()], dining, placed(0.05, 0.02, 0.0, 0.735))
     chair = seating.chair()
     geometry = chair.geometry()
-    stage.shape(
-        "Chair at the front", geometry, chair.materials, dining, placed(0.62, 0.28, -112.0), "dining-"
-    )
-    stage.shape("Chair at the back", geometry, chair.materials, dining, placed(0.02, -0.68, 8.0), "dining-")
+    stage.shape("Chair at the front", geometry, chair.materials, None, placed(-1.5, 0.48, -112.0))
+    stage.shape("Chair at the back", geometry, chair.materials, None, placed(-2.1, -0.48, 8.0))
     lamp = stage.group("Floor lamp", placed(0.42, -2.12, 20.0))
     stage.put(decor.floor_lamp(), lamp)
     stage.nodes.append(

@@ -59,9 +59,9 @@ class Stage:
         self.materials = materials
         self.nodes: list[Node] = []
 
-    def group(self, name: str, at: Transform = IDENTITY) -> str:
+    def group(self, name: str, at: Transform = IDENTITY, locked: bool = False) -> str:
         """Adds a group and gives its id."""
-        made = Group(id=f"group-{slug(name)}", name=name, transform=at)
+        made = Group(id=f"group-{slug(name)}", name=name, transform=at, locked=locked)
         self.nodes.append(made)
         return made.id
 
