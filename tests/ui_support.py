@@ -196,7 +196,8 @@ class Driver:
 
     def settle(self) -> None:
         """Until the picture is up to date."""
-        self.until(lambda: self.feed.state is Freshness.CURRENT and not self.feed.busy)
+        state = self.feed
+        self.until(lambda: state.state is Freshness.CURRENT and not state.busy and not state.moving)
 
     def until(self, what: Callable[[], bool]) -> None:
         self.bot.waitUntil(what, timeout=20_000)

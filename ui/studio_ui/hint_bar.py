@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QToolButton
+from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QSizePolicy, QToolButton
 
 from studio_core.scene.diff import Aspect, Changes
 from studio_core.scene.nodes import Scene
@@ -18,12 +18,17 @@ STEPS = (
 )
 
 
+_HEIGHT = 32
+
+
 class HintBar(QFrame):
     """Above the picture, until everything was tried or it is closed; then never again."""
 
     def __init__(self, context: Context, settings: Settings) -> None:
         super().__init__()
         self.setObjectName("hints")
+        self.setFixedHeight(_HEIGHT)
+        self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)  # a text resizes no picture
         self._settings = settings
         self._done: set[Aspect] = set()
         self._labels = [QLabel() for _ in STEPS]

@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
-import base64
 from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
 
-from PySide6.QtCore import QByteArray, Qt, QTimer
+from PySide6.QtCore import Qt, QTimer
 from PySide6.QtGui import QCloseEvent, QDragEnterEvent, QDropEvent
 from PySide6.QtWidgets import (
     QApplication,
-    QDockWidget,
     QMainWindow,
     QMessageBox,
-    QTabBar,
-    QTabWidget,
     QToolBar,
     QWidget,
 )
@@ -35,6 +31,7 @@ from studio_ui.context import Context, Subscriptions
 from studio_ui.dialogs import Dialogs, KeysDialog, PluginsDialog
 from studio_ui.feed import Shown
 from studio_ui.hint_bar import HintBar
+from studio_ui.layout import Layout
 from studio_ui.panels.history import HistoryPanel
 from studio_ui.panels.jobs import JobsPanel
 from studio_ui.panels.lighting import LightingPanel
@@ -47,11 +44,10 @@ from studio_ui.panels.shading import ShadingPanel
 from studio_ui.project_files import PROJECTS, SUFFIX, ProjectFiles
 from studio_ui.settings import Settings
 from studio_ui.status import StatusBar
-from studio_ui.theme import DARK, PANEL_WIDTH, THEMES, Theme, wear
+from studio_ui.theme import DARK, THEMES, Theme, wear
 from studio_ui.transfer import ENVIRONMENTS, Transfer
 from studio_ui.view_controls import ViewControls
 
-_LAYOUT = 1  # of the docks; stored layouts of another number are left alone
 _AUTOSAVE_MS = 500
 
 
@@ -82,22 +78,20 @@ class MainWindow(QMainWindow):
             viewport, context.document, context.session, context.editing, context.feed, self.status.say
         )
         self.commands = Commands(context, self.tools)
-        self.panels: dict[str, Panel] = {}
-        self.docks: dict[str, QDockWidget] = {}
         self.setAcceptDrops(True)
         self.setDockNestingEnabled(True)
         self.hints = HintBar(context, settings)
         self.setCentralWidget(stacked(self.hints, viewport.widget))
         self.setStatusBar(self.status)
         self.actions_ = ActionSet(self, viewport.widget, self._handlers(), self._conditions())
-        self._make_docks()
+        self.layout_ = Layout(self, settings, self._make_panels())
+        self.panels, self.docks = self.layout_.panels, self.layout_.docks
         self._make_menus()
         self._make_bar()
         self._connect()
         self.set_theme(THEMES.get(settings.get("theme", DARK.name), DARK))
         self.resize(1440, 900)
-        self._first_layout = self.saveState(_LAYOUT)
-        self._restore_layout()
+        self.layout_.restore()
         self._refresh_soon()
         self._title()
 
@@ -119,7 +113,7 @@ class MainWindow(QMainWindow):
             "file.quit": self.close,
             "view.dark": lambda: self.set_theme(THEMES["dark"]),
             "view.light": lambda: self.set_theme(THEMES["light"]),
-            "window.reset": self.reset_layout,
+            "window.reset": lambda: self.layout_.reset(),
             "help.keys": self._keys,
             "help.plugins": lambda: PluginsDialog(self, self.context.host).open(),
             "help.about": self._about,
@@ -131,39 +125,19 @@ class MainWindow(QMainWindow):
         made["savable"] = lambda: self.files.modified or self.files.path is None
         return made
 
-    def _make_docks(self) -> None:
+    def _make_panels(self) -> list[tuple[Panel, Qt.DockWidgetArea]]:
         context = self.context
-        made: list[tuple[Panel, Qt.DockWidgetArea]] = [
-            (OutlinerPanel(context), Qt.DockWidgetArea.LeftDockWidgetArea),
-            (HistoryPanel(context), Qt.DockWidgetArea.LeftDockWidgetArea),
-            (JobsPanel(context), Qt.DockWidgetArea.LeftDockWidgetArea),
-            (LogPanel(context), Qt.DockWidgetArea.LeftDockWidgetArea),
-            (PropertiesPanel(context), Qt.DockWidgetArea.RightDockWidgetArea),
-            (MaterialsPanel(context), Qt.DockWidgetArea.RightDockWidgetArea),
-            (LightingPanel(context, self.transfer.load_environment), Qt.DockWidgetArea.RightDockWidgetArea),
-            (ShadingPanel(context), Qt.DockWidgetArea.RightDockWidgetArea),
+        left, right = Qt.DockWidgetArea.LeftDockWidgetArea, Qt.DockWidgetArea.RightDockWidgetArea
+        return [
+            (OutlinerPanel(context), left),
+            (HistoryPanel(context), left),
+            (JobsPanel(context), left),
+            (LogPanel(context), left),
+            (PropertiesPanel(context), right),
+            (MaterialsPanel(context), right),
+            (LightingPanel(context, self.transfer.load_environment), right),
+            (ShadingPanel(context), right),
         ]
-        for panel, area in made:
-            dock = QDockWidget(panel.title, self)
-            dock.setObjectName(f"dock-{panel.id}")
-            dock.setWidget(panel)
-            dock.setMinimumWidth(PANEL_WIDTH - 60)
-            self.addDockWidget(area, dock)
-            self.panels[panel.id], self.docks[panel.id] = panel, dock
-        docks = self.docks
-        self.tabifyDockWidget(docks["history"], docks["jobs"])
-        self.tabifyDockWidget(docks["jobs"], docks["log"])
-        for name in ("materials", "lighting", "shading"):
-            self.tabifyDockWidget(docks["properties"], docks[name])
-        docks["history"].raise_()
-        docks["properties"].raise_()
-        for tabs in self.findChildren(QTabBar):
-            tabs.setElideMode(Qt.TextElideMode.ElideNone)
-            tabs.setUsesScrollButtons(False)
-        self.setTabPosition(Qt.DockWidgetArea.AllDockWidgetAreas, QTabWidget.TabPosition.North)
-        self.resizeDocks([docks["outliner"], docks["history"]], [560, 260], Qt.Orientation.Vertical)
-        sides = [docks["outliner"], docks["properties"]]
-        self.resizeDocks(sides, [PANEL_WIDTH - 40, PANEL_WIDTH + 20], Qt.Orientation.Horizontal)
 
     def _make_menus(self) -> None:
         bar = self.menuBar()
@@ -337,23 +311,6 @@ class MainWindow(QMainWindow):
         for panel in self.panels.values():
             panel.set_theme(theme)
 
-    def reset_layout(self) -> None:
-        """The docks as at the first start."""
-        self.restoreState(self._first_layout, _LAYOUT)
-
-    def _restore_layout(self) -> None:
-        for name, restore in (("geometry", self.restoreGeometry), ("layout", self._restore_docks)):
-            stored = self.settings.get(name, "")
-            if stored:
-                restore(QByteArray.fromBase64(stored.encode()))
-
-    def _restore_docks(self, state: QByteArray) -> None:
-        self.restoreState(state, _LAYOUT)
-
-    def _keep_layout(self) -> None:
-        for name, state in (("geometry", self.saveGeometry()), ("layout", self.saveState(_LAYOUT))):
-            self.settings.set(name, base64.b64encode(state.data()).decode())
-
     # menus
 
     def _open(self) -> None:
@@ -434,7 +391,7 @@ class MainWindow(QMainWindow):
         """Stop timers and subscriptions; a second call does nothing."""
         if not self._autosave.isActive():
             return
-        self._keep_layout()
+        self.layout_.keep()
         self._autosave.stop()
         self._soon.stop()
         self.tools.close()
@@ -442,7 +399,5 @@ class MainWindow(QMainWindow):
         self.context.tasks.cancel()
         self.files.close()
         self._subscriptions.close()
-        self.view_controls.close_panel()
-        self.hints.close_panel()
-        for panel in self.panels.values():
-            panel.close_panel()
+        for part in (self.view_controls, self.hints, *self.panels.values()):
+            part.close_panel()

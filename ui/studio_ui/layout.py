@@ -1,0 +1,70 @@
+"""Where the panels are: docks and their tabs, remembered between sessions."""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Sequence
+from itertools import pairwise
+
+from PySide6.QtCore import QByteArray, Qt
+from PySide6.QtWidgets import QDockWidget, QMainWindow, QTabBar, QTabWidget
+
+from studio_ui.panels.panel import Panel
+from studio_ui.settings import Settings
+from studio_ui.theme import PANEL_WIDTH
+
+_VERSION = 1  # stored layouts of another number are left alone
+_TABS = (("history", "jobs", "log"), ("properties", "materials", "lighting", "shading"))
+
+
+class Layout:
+    """The docks of a main window by panel id."""
+
+    def __init__(
+        self,
+        window: QMainWindow,
+        settings: Settings,
+        panels: Sequence[tuple[Panel, Qt.DockWidgetArea]],
+    ) -> None:
+        self.panels = {panel.id: panel for panel, _ in panels}
+        self.docks: dict[str, QDockWidget] = {}
+        self._window, self._settings = window, settings
+        for panel, area in panels:
+            dock = QDockWidget(panel.title, window)
+            dock.setObjectName(f"dock-{panel.id}")
+            dock.setWidget(panel)
+            dock.setMinimumWidth(PANEL_WIDTH - 60)
+            window.addDockWidget(area, dock)
+            self.docks[panel.id] = dock
+        docks = self.docks
+        for names in _TABS:
+            for one, other in pairwise(names):
+                window.tabifyDockWidget(docks[one], docks[other])
+            docks[names[0]].raise_()
+        window.setTabPosition(Qt.DockWidgetArea.AllDockWidgetAreas, QTabWidget.TabPosition.North)
+        for tabs in window.findChildren(QTabBar):
+            tabs.setElideMode(Qt.TextElideMode.ElideNone)
+            tabs.setUsesScrollButtons(False)
+        window.resizeDocks([docks["outliner"], docks["history"]], [560, 260], Qt.Orientation.Vertical)
+        sides = [docks["outliner"], docks["properties"]]
+        window.resizeDocks(sides, [PANEL_WIDTH - 40, PANEL_WIDTH + 20], Qt.Orientation.Horizontal)
+        self._first = QByteArray()
+
+    def restore(self) -> None:
+        """As it was left; what is here now becomes what `reset` goes back to."""
+        self._first = self._window.saveState(_VERSION)
+        geometry, state = (self._settings.get(name, "") for name in ("geometry", "layout"))
+        if geometry:
+            self._window.restoreGeometry(QByteArray.fromBase64(geometry.encode()))
+        if state:
+            self._window.restoreState(QByteArray.fromBase64(state.encode()), _VERSION)
+
+    def reset(self) -> None:
+        """The docks as at the first start."""
+        self._window.restoreState(self._first, _VERSION)
+
+    def keep(self) -> None:
+        """Remember how it is."""
+        stored = {"geometry": self._window.saveGeometry(), "layout": self._window.saveState(_VERSION)}
+        for name, state in stored.items():
+            self._settings.set(name, base64.b64encode(state.data()).decode())
