@@ -6,12 +6,14 @@ import os
 import subprocess
 import sys
 
+OFFSCREEN = ("offscreen", "minimal")  # Qt platforms whose windows nobody sees
+
 
 def why_no_window() -> str:
     """Empty when a window can be opened, else the reason."""
     if sys.platform.startswith("linux"):
         platform = os.environ.get("QT_QPA_PLATFORM", "")
-        if platform.partition(":")[0] in ("offscreen", "minimal"):
+        if platform.partition(":")[0] in OFFSCREEN:
             return f"QT_QPA_PLATFORM is {platform}"
         if not platform and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
             return "there is no display"
@@ -30,7 +32,8 @@ def why_no_window() -> str:
         return "the display does not answer"
     if tried.returncode == 0:
         return ""
-    if "ModuleNotFoundError" in tried.stderr:
-        return "PySide6 is not installed"
     lines = [line for line in tried.stderr.splitlines() if line.strip()]
+    for line in lines:
+        if line.startswith("qt.qpa."):  # the first says most; a list of platforms comes last
+            return line.partition(": ")[2].rstrip(".")
     return lines[-1] if lines else "Qt cannot open the display"

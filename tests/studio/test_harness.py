@@ -1,0 +1,131 @@
+"""Rows of benchmarks: spreads, the JSON that others read, the table that people read."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import studio.bench.harness as harness
+from studio.bench.harness import Report, Row, Timing, commit, machine, relative_rmse, timed
+from studio.bench.run import SUITES
+from studio.cli import main
+from studio_core import __version__
+
+positive = st.floats(1e-3, 1e3)
+
+
+def report() -> Report:
+    made = Report("little", quick=True)
+    made.add("sample", "error", np.float32(0.25), "1", 0.5)
+    made.add("start", "window_s", 1, "s")
+    made.notes.append("Something was left out.")
+    return made
+
+
+# --- figures ------------------------------------------------------------------------------------------
+
+
+def test_a_row_holds_plain_numbers() -> None:
+    first, second = report().rows
+    assert first == Row("sample", "error", 0.25, "1", 0.5)
+    assert second == Row("start", "window_s", 1.0, "s", 0.0)
+    assert type(first.value) is float
+    assert type(second.spread) is float
+
+
+def test_timing_is_the_median_and_half_the_interquartile_range(monkeypatch: pytest.MonkeyPatch) -> None:
+    durations = [100.0, 5.0, 1.0, 2.0, 50.0]
+    clock: Iterator[float] = iter(
+        instant for index, seconds in enumerate(durations) for instant in (index * 1e3, index * 1e3 + seconds)
+    )
+    monkeypatch.setattr(harness.time, "perf_counter", lambda: next(clock))
+    calls: list[None] = []
+    assert timed(lambda: calls.append(None), 5, warm_up=3) == Timing(5.0, (50.0 - 2.0) / 2)
+    assert len(calls) == 8
+    assert next(clock, None) is None  # warm-up is not on the clock
+
+
+def test_relative_rmse_is_the_house_error() -> None:
+    assert relative_rmse([1, 1, 1, 1], [1, 1, 1, 1]) == 0
+    assert relative_rmse([2, 0], [1, 1]) == 1
+    assert relative_rmse([4, 0], [3, 1]) == pytest.approx(1 / 2)
+
+
+@given(st.lists(st.tuples(positive, positive), min_size=1, max_size=30), positive)
+def test_relative_rmse_does_not_depend_on_the_unit(pairs: list[tuple[float, float]], scale: float) -> None:
+    made, truth = np.array(pairs).T
+    error = relative_rmse(made, truth)
+    assert error >= 0
+    assert relative_rmse(made * scale, truth * scale) == pytest.approx(error)
+    assert relative_rmse(truth * (1 + scale), truth) == pytest.approx(
+        scale * np.sqrt((truth**2).mean()) / truth.mean()
+    )
+
+
+# --- what is written ----------------------------------------------------------------------------------
+
+
+def test_the_json_has_the_promised_shape(tmp_path: Path) -> None:
+    made = report()
+    made.write(tmp_path / "rows.json")
+    found = json.loads((tmp_path / "rows.json").read_text())
+    assert list(found) == ["suite", "version", "commit", "machine", "quick", "rows", "notes"]
+    assert (found["suite"], found["version"], found["quick"]) == ("little", __version__, True)
+    assert found["rows"] == [
+        {"case": "sample", "metric": "error", "value": 0.25, "unit": "1", "spread": 0.5},
+        {"case": "start", "metric": "window_s", "value": 1.0, "unit": "s", "spread": 0.0},
+    ]
+    assert found["machine"]["cores"] >= 1
+    assert found["notes"] == ["Something was left out."]
+
+
+def test_the_machine_is_described_in_plain_values() -> None:
+    found = machine()
+    assert {"processor", "cores", "system", "python", "numpy", "numba"} <= set(found)
+    assert json.loads(json.dumps(found)) == found
+
+
+def test_the_commit_is_a_hash_or_nothing() -> None:
+    assert re.fullmatch(r"([0-9a-f]{7,40}|\S+-g[0-9a-f]+)?(-dirty)?", commit())
+
+
+def test_the_commit_is_empty_without_git(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("PATH", "")
+    assert commit() == ""
+
+
+def test_the_table_has_a_line_a_row() -> None:
+    lines = report().markdown().splitlines()
+    assert lines[0] == "# little"
+    table = [[cell.strip() for cell in line.strip("|").split("|")] for line in lines if line.startswith("|")]
+    assert table[0] == ["case", "metric", "value", "unit", "spread"]
+    assert table[2:] == [["sample", "error", "0.25", "1", "0.5"], ["start", "window_s", "1", "s", "0"]]
+    assert lines[-1] == "Something was left out."
+
+
+# --- the verbs ----------------------------------------------------------------------------------------
+
+
+def test_bench_runs_a_suite_prints_its_table_and_writes_its_rows(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    module = tmp_path / "little_suite.py"
+    module.write_text("def run(report, program):\n    report.add('a', 'b_s', 2, 's', report.quick)\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    for verb in ("bench", "stress"):
+        monkeypatch.setitem(SUITES, verb, {"little": "little_suite"})
+        assert main([verb, "little", "--quick", "--json", str(tmp_path / f"{verb}.json")]) == 0
+        assert "| a | b_s | 2 | s | 1 |" in capsys.readouterr().out
+        assert json.loads((tmp_path / f"{verb}.json").read_text())["rows"][0]["value"] == 2
+
+
+def test_every_suite_of_bench_is_there() -> None:
+    for where in SUITES["bench"].values():
+        assert Path(harness.__file__).with_name(f"{where.rpartition('.')[2]}.py").is_file()
