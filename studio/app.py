@@ -17,11 +17,13 @@ from studio import samples
 from studio_core.contract import Services, ShadingBackend
 from studio_core.document import Document
 from studio_core.errors import LucarneError
+from studio_core.folders import user_cache
 from studio_core.parallel import Workers
 from studio_core.params import build
 from studio_core.registry import PluginHost
 from studio_core.session import Session
 from studio_core.shading.artifacts import MeasuredError
+from studio_core.shading.cache import DiskCache
 from studio_core.shading.frame import Frame
 from studio_core.shading.job import Job
 from studio_core.shading.pipeline import Pipeline
@@ -109,7 +111,7 @@ def assemble(
 
     editing = Editing(document, journal.problem)
     tasks = Tasks(files, bridge.post, journal)
-    shading = shading or PluginShading(Services(workers, host))
+    shading = shading or PluginShading(Services(workers, host, DiskCache(user_cache() / "computed")))
     feed = PictureFeed(document, session, shading, compute, bridge.post, later)
     context = Context(document, session, editing, host, journal, tasks, feed)
     window = MainWindow(context, RasterViewport(), settings, files, _samples(), ask)

@@ -35,9 +35,11 @@ class Headless:
     @cached_property
     def services(self) -> Services:
         """Threads and registry for backends."""
+        from studio_core.folders import user_cache
         from studio_core.parallel import Workers
+        from studio_core.shading.cache import DiskCache
 
-        return Services(Workers(self.threads), self.registry)
+        return Services(Workers(self.threads), self.registry, DiskCache(user_cache() / "computed"))
 
     def say(self, text: str, end: str = "\n") -> None:
         """One line on stderr, where there is one."""

@@ -18,6 +18,7 @@ from studio_core.params import Value
 from studio_core.scene.nodes import Material, MeshObject, Node, Scene
 
 if TYPE_CHECKING:
+    from studio_core.shading.cache import DiskCache
     from studio_core.shading.job import Job
     from studio_core.shading.pipeline import Stage
 
@@ -151,7 +152,7 @@ class Services:
 
     workers: Any
     registry: Registry
-    cache: Any = None
+    cache: DiskCache | None = None
 
 
 class Progress(Protocol):

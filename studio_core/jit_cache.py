@@ -22,9 +22,9 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import platformdirs
-
 # numba's inner modules are typed in some versions and not in others.
+from studio_core.folders import user_cache
+
 llvm: Any = importlib.import_module("llvmlite.binding")
 numba: Any = importlib.import_module("numba")
 numba_caching: Any = importlib.import_module("numba.core.caching")
@@ -39,9 +39,7 @@ _IMPORT = re.compile(r"^\s*(?:from\s+([.\w]+)\s+import\s+(\([^)]*\)|[^\n]+)|impo
 
 def cache_root() -> Path:
     """The folder of all kernels of this user; `LUCARNE_CACHE` moves it."""
-    moved = os.environ.get("LUCARNE_CACHE")
-    base = Path(moved) if moved else Path(platformdirs.user_cache_dir("lucarne", appauthor=False))
-    return base / "kernels"
+    return user_cache() / "kernels"
 
 
 def environment_hash() -> str:

@@ -112,7 +112,7 @@ class Lighting:
     environment: Environment | None
     tree: LightTree | None
     lamps: tuple[Lamp, ...]
-    integrated: object = None
+    integrated: tuple[object, ...] = ()
 
     @property
     def layers(self) -> tuple[NodeId, ...]:

@@ -28,6 +28,8 @@ from studio_core.shading.lamps import lamps
 from studio_core.shading.materials import same_shapes, shapes
 from studio_core.shading.pipeline import Inputs
 
+F32 = npt.NDArray[np.float32]
+
 BODIES = Aspect.STRUCTURE | Aspect.GEOMETRY
 CHUNK = 1 << 14
 LAYERS = 6  # most transparent surfaces looked through
@@ -149,6 +151,7 @@ class LightingStage:
 
     def __init__(self, services: Services) -> None:
         self._workers = services.workers
+        self._cache = services.cache
 
     def run(self, frame: Frame, inputs: Inputs, job: Job) -> Lighting:
         """Integrates again only for another picture, rotation or finer directions."""
@@ -156,18 +159,29 @@ class LightingStage:
         found = (node for node in scene.of(Environment) if scene.shown(node.id))
         environment = next(found, None)
         tree: LightTree | None = None
-        key: object = None
+        key: tuple[object, ...] = ()
         if environment is not None:
             key = (environment.image.key, environment.azimuth, environment.tilt)
             previous: Lighting | None = inputs.previous
             if previous is not None and previous.integrated == key:
                 tree = previous.tree
             else:
-                rotation = environment.rotation().matrix()[:3, :3]
-                pixels = environment.image.pixels[..., :3]
-                leaves = integrate_environment(pixels, rotation, LARGEST, self._workers, job)
-                tree = LightTree.build(leaves)
+                turned = previous is not None and previous.integrated[0] == key[0]
+                tree = LightTree.build(self._leaves(environment, key, job, keep=not turned))
         return Lighting(environment, tree, lamps(scene), key)
+
+    def _leaves(self, environment: Environment, key: tuple[object, ...], job: Job, keep: bool) -> F32:
+        method = "environment over 2^17 leaves, 1"
+        kept = self._cache.get(method, *key) if self._cache is not None else None
+        if kept is not None and kept["leaves"].shape == (1 << LARGEST, 3):
+            found: F32 = kept["leaves"]
+            return found
+        rotation = environment.rotation().matrix()[:3, :3]
+        pixels = environment.image.pixels[..., :3]
+        leaves = integrate_environment(pixels, rotation, LARGEST, self._workers, job)
+        if self._cache is not None and keep:  # not every step of a turn
+            self._cache.put({"leaves": leaves}, method, *key)
+        return leaves
 
 
 class PrimaryStage:

@@ -6,8 +6,6 @@ from pathlib import Path
 
 import numpy as np
 from pytestqt.qtbot import QtBot
-from studio_plugins.brdfs import plugin as brdfs
-from studio_plugins.reference import plugin as reference
 from ui_support import Answers, Driver, Fake, room
 
 from studio.app import assemble
@@ -15,6 +13,8 @@ from studio_core.edits import Add, SetMaterial
 from studio_core.registry import PluginHost
 from studio_core.scene.geometry import Image
 from studio_core.scene.nodes import Environment
+from studio_plugins.brdfs import plugin as brdfs
+from studio_plugins.reference import plugin as reference
 from studio_ui.settings import Settings
 
 
