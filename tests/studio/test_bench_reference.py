@@ -57,6 +57,7 @@ def rows(folder: Path) -> dict[tuple[str, str], dict[str, Any]]:
     return named
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("installed", [True, False])
 def test_every_promised_row_is_there(installed: bool, small: pytest.MonkeyPatch, tmp_path: Path) -> None:
     finder = SimpleNamespace(find_spec=lambda name: object() if installed else None)

@@ -196,6 +196,7 @@ def area(scene: Scene, node: MeshObject) -> float:
     return float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2)
 
 
+@pytest.mark.slow
 def test_irradiance_against_mitsuba(
     project: Path, command: Command, services: Services, tmp_path: Path
 ) -> None:
