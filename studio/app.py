@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TextIO
 
-from PySide6.QtCore import QCoreApplication, QEvent, Qt, QTimer
+from PySide6.QtCore import QCoreApplication, QEvent, Qt
 from PySide6.QtWidgets import QApplication
 
 from studio import samples
@@ -106,13 +106,10 @@ def assemble(
     journal, document, session = Journal(), Document(), Session()
     bridge = Bridge(lambda error: journal.problem("Something in the window", error))
 
-    def later(milliseconds: int, call: Callable[[], None]) -> None:
-        QTimer.singleShot(milliseconds, bridge, call)
-
     editing = Editing(document, journal.problem)
     tasks = Tasks(files, bridge.post, journal)
     shading = shading or PluginShading(Services(workers, host, DiskCache(user_cache() / "computed")))
-    feed = PictureFeed(document, session, shading, compute, bridge.post, later)
+    feed = PictureFeed(document, session, shading, compute, bridge.post, bridge.later)
     context = Context(document, session, editing, host, journal, tasks, feed)
     window = MainWindow(context, RasterViewport(), settings, files, _samples(), ask)
     for failure in host.failures:
@@ -157,7 +154,7 @@ def _first(studio: Studio, path: Path | None, read_only: bool) -> None:
             files.open_copy(samples.sample())
         files.offer_unsaved()
 
-    QTimer.singleShot(0, studio.bridge, start)
+    studio.bridge.later(0, start)
 
 
 def _warm(context: Context, compute: Executor, files: Executor, bridge: Bridge) -> None:

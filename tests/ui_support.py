@@ -188,11 +188,15 @@ class Driver:
 
     def show(self, scene: Scene) -> None:
         """Put a scene on the screen, looked at from the front."""
+        self.open(scene)
+        self.settle()
+
+    def open(self, scene: Scene) -> None:
+        """The same, without waiting for the picture."""
         self.document.restore((Step("Open", scene),), 0)
         view = self.session.view
         place = looking((0.0, 2.5, 7.0), (0.0, 0.6, 0.0))
         self.session.look(View(place, 40.0, view.width, view.height, 7.2))
-        self.settle()
 
     def settle(self) -> None:
         """Until the picture is up to date."""

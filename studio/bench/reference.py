@@ -183,8 +183,9 @@ def _pictures(report: Report, program: Headless, case: str, scene: Scene, folder
     truth = (first + second) / 2
     backend = program.registry.get("backend", "reference")
     view = dataclasses.replace(scene_view(scene, None, width, height), antialias=4)
+    directions = DIRECTIONS >> 3 if report.quick else DIRECTIONS
     for vertices in (30_000, 200_000):
-        values = {"vertices": vertices, "directions": str(DIRECTIONS)}
+        values = {"vertices": vertices, "directions": str(directions)}
         made = picture(scene, view, backend, backend_params(backend, values), program.services)
         solid = made.coverage >= 1
         noise = relative_rmse(first[solid], second[solid]) / 2

@@ -56,6 +56,11 @@ class Job:
         if self._on_progress is not None:
             self._on_progress(self)
 
+    @property
+    def listened_to(self) -> bool:
+        """Whether somebody wants partial results; without, steps towards the last need not be made."""
+        return self._on_publish is not None
+
     def publish(self, artifact: Any) -> None:
         """Show a partial result; ignored where nobody listens."""
         if self._on_publish is not None:

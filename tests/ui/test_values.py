@@ -214,6 +214,18 @@ def test_the_bridge_brings_calls_home_in_order(qtbot: QtBot) -> None:
     assert len(came) == 50
 
 
+def test_the_bridge_waits_and_forgets_when_closed(qtbot: QtBot) -> None:
+    bridge, came = Bridge(), []
+    bridge.later(30, lambda: came.append("late"))
+    bridge.later(0, lambda: came.append("soon"))
+    qtbot.waitUntil(lambda: came == ["soon", "late"])
+    bridge.later(10, lambda: came.append("never"))
+    bridge.close()
+    bridge.later(0, lambda: came.append("never"))
+    qtbot.wait(40)
+    assert came == ["soon", "late"]
+
+
 def test_the_bridge_tells_errors_and_goes_on(qtbot: QtBot) -> None:
     told: list[Exception] = []
     came: list[int] = []

@@ -14,12 +14,14 @@ import pytest
 from PySide6.QtCore import QEvent
 from PySide6.QtGui import QKeySequence
 from PySide6.QtWidgets import QApplication, QWidget
+from pytestqt.qtbot import QtBot
 from ui_support import Driver, Make, room
 
 from studio_core.document import Document
 from studio_core.registry import PluginHost
 from studio_ui.actions import ACTIONS, specs
 from studio_ui.dialogs import KeysDialog, PluginsDialog, UnitDialog, likely_unit
+from studio_ui.feed import REST_MS
 from studio_ui.icons import ICONS, icon
 from studio_ui.theme import THEMES
 
@@ -106,8 +108,9 @@ def test_a_damaged_state_file_is_as_good_as_none(make: Make, tmp_path: Path) -> 
     assert driver.window.settings.recent == []
 
 
-def test_twenty_lives_leave_nothing_behind(make: Make, qapp: QApplication) -> None:
+def test_twenty_lives_leave_nothing_behind(make: Make, qapp: QApplication, qtbot: QtBot) -> None:
     def count() -> tuple[int, int, int]:
+        qtbot.wait(2 * REST_MS)  # timers that were under way
         gc.collect()
         qapp.sendPostedEvents(None, QEvent.Type.DeferredDelete)
         documents = sum(isinstance(found, Document) for found in gc.get_objects())
@@ -115,10 +118,10 @@ def test_twenty_lives_leave_nothing_behind(make: Make, qapp: QApplication) -> No
 
     def live() -> None:
         driver = make(threads=True)
-        driver.show(room())
+        driver.open(room())
         driver.session.select(["stool"])
         driver.do("object.right")
-        driver.settle()
+        driver.until(lambda: driver.feed.last is not None)
         driver.close()
         driver.forget()
 

@@ -172,6 +172,7 @@ class ActionSet:
                 owner.addAction(action)
             if spec.group:
                 action.setCheckable(True)
+                action.setIconVisibleInMenu(False)  # there the check mark tells
                 groups.setdefault(spec.group, QActionGroup(owner)).addAction(action)
             self.actions[spec.id] = action
 

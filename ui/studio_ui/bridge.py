@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable
 
-from PySide6.QtCore import QObject, Qt, Signal
+from PySide6.QtCore import QCoreApplication, QObject, Qt, QTimerEvent, Signal
 
 
 class Bridge(QObject):
@@ -18,6 +18,7 @@ class Bridge(QObject):
         self.on_error = on_error
         self._guard = threading.Lock()
         self._open = True
+        self._later: dict[int, Callable[[], object]] = {}
         self._called.connect(self._run, Qt.ConnectionType.QueuedConnection)
 
     def post(self, call: Callable[[], object]) -> None:
@@ -26,10 +27,26 @@ class Bridge(QObject):
             if self._open:
                 self._called.emit(call)
 
+    def later(self, milliseconds: int, call: Callable[[], object]) -> None:
+        """Run `call` after a while; from the window's thread alone."""
+        if self._open:
+            self._later[self.startTimer(milliseconds)] = call
+
     def close(self) -> None:
         """Drop what is queued and what is still to come."""
         with self._guard:
             self._open = False
+        for timer in self._later:
+            self.killTimer(timer)
+        self._later.clear()
+        QCoreApplication.sendPostedEvents(self)  # Qt keeps what nobody receives
+
+    def timerEvent(self, event: QTimerEvent) -> None:
+        """One of `later`."""
+        self.killTimer(event.timerId())
+        call = self._later.pop(event.timerId(), None)
+        if call is not None:
+            self._run(call)
 
     def _run(self, call: Callable[[], object]) -> None:
         if not self._open:

@@ -92,7 +92,8 @@ class ReferenceStage:
         valid = np.zeros(len(surfaces.mesh.positions), np.bool_)
         valid[points] = True
         last = int(params.directions).bit_length() - 1
-        levels = [*(level for level in STEPS if level < last), last] if lighting.environment else [last]
+        steps = STEPS if lighting.environment is not None and job.listened_to else ()
+        levels = [*(level for level in steps if level < last), last]
         made: Radiance | None = None
         for level in levels:
             if lighting.environment is not None:
