@@ -183,6 +183,7 @@ class Driver:
         )
         self.viewport: Any = self.window.viewport
         self._closed = False
+        self.patience = 20_000  # milliseconds
         self.window.resize(1100, 700)
         self.window.show()
 
@@ -204,7 +205,7 @@ class Driver:
         self.until(lambda: state.state is Freshness.CURRENT and not state.busy and not state.moving)
 
     def until(self, what: Callable[[], bool]) -> None:
-        self.bot.waitUntil(what, timeout=20_000)
+        self.bot.waitUntil(what, timeout=self.patience)
 
     def idle(self) -> None:
         """Until queued calls have run."""

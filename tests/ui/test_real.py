@@ -22,6 +22,7 @@ def test_the_reference_backend_lights_the_room_in_the_window(qtbot: QtBot, tmp_p
     host = PluginHost([brdfs, reference])
     studio = assemble(settings=Settings(tmp_path), host=host, ask=Answers(), threads=1)
     driver = Driver(studio, Fake(), Answers(), qtbot)
+    driver.patience = 300_000  # kernels may have to be compiled first
     try:
         driver.window.resize(700, 500)
         driver.session.shade_with("reference", {"vertices": 500, "directions": "1024"})
