@@ -215,3 +215,19 @@ def test_help_and_lists_open(driver: Driver) -> None:
     driver.window._fill_cameras()
     assert driver.window._camera_menu.actions()[0].text() == "Camera"
     assert driver.window.view_controls.camera.currentText() == "Camera"
+
+
+def test_hints_are_ticked_off_and_never_come_again(make: Make, tmp_path: Path) -> None:
+    state = tmp_path / "mine"
+    driver = make(state=state)
+    driver.show(room())
+    assert driver.window.hints.isVisible()
+    size = driver.viewport.size()
+    driver.session.select(["stool"])
+    driver.do("object.right")
+    assert driver.window.hints._labels[0].text().startswith("✓")
+    driver.settle()
+    assert driver.viewport.size() == size, "a text must not resize the picture"
+    driver.window.hints.dismiss()
+    driver.close()
+    assert make(state=state).window.hints.isHidden()

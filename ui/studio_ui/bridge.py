@@ -13,7 +13,7 @@ class Bridge(QObject):
 
     _called = Signal(object)
 
-    def __init__(self, on_error: Callable[[Exception], None] | None = None) -> None:
+    def __init__(self, on_error: Callable[[Exception], object] | None = None) -> None:
         super().__init__()
         self.on_error = on_error
         self._guard = threading.Lock()

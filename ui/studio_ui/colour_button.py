@@ -20,8 +20,8 @@ def to_display(colour: Colour) -> QColor:
 
 def to_linear(colour: QColor) -> Colour:
     """Linear Rec.709 of an sRGB colour."""
-    red, green, blue, _ = colour.toRgb().getRgbF()
-    return (_decode(red), _decode(green), _decode(blue))
+    seen = colour.toRgb()
+    return (_decode(seen.redF()), _decode(seen.greenF()), _decode(seen.blueF()))
 
 
 def _encode(x: float) -> float:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 
@@ -57,11 +58,11 @@ class Commands:
         nudges = {"left": (-1, 0, 0), "right": (1, 0, 0), "away": (0, 0, 1), "near": (0, 0, -1)}
         nudges |= {"up": (0, 1, 0), "down": (0, -1, 0)}
         for name, way in nudges.items():
-            made[f"object.{name}"] = lambda w=way: self.nudge(*w)
+            made[f"object.{name}"] = partial(self.nudge, *way)
         for tool in ("select", "move", "rotate"):
-            made[f"tool.{tool}"] = lambda t=tool: self._tools.use(t)
+            made[f"tool.{tool}"] = partial(self._tools.use, tool)
         for axis in navigation.AXES:
-            made[f"view.{axis}"] = lambda a=axis: self.look_from(a)
+            made[f"view.{axis}"] = partial(self.look_from, axis)
         return made
 
     def conditions(self) -> dict[str, Callable[[], bool]]:

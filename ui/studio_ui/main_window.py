@@ -8,13 +8,7 @@ from pathlib import Path
 
 from PySide6.QtCore import Qt, QTimer
 from PySide6.QtGui import QCloseEvent, QDragEnterEvent, QDropEvent
-from PySide6.QtWidgets import (
-    QApplication,
-    QMainWindow,
-    QMessageBox,
-    QToolBar,
-    QWidget,
-)
+from PySide6.QtWidgets import QApplication, QMainWindow, QMessageBox, QToolBar, QWidget
 
 from studio_core import __version__
 from studio_core.errors import LucarneError
@@ -399,5 +393,7 @@ class MainWindow(QMainWindow):
         self.context.tasks.cancel()
         self.files.close()
         self._subscriptions.close()
-        for part in (self.view_controls, self.hints, *self.panels.values()):
-            part.close_panel()
+        self.view_controls.close_panel()
+        self.hints.close_panel()
+        for panel in self.panels.values():
+            panel.close_panel()

@@ -90,7 +90,8 @@ class StatusBar(QStatusBar):
             self.pixel.clear()
             return
         red, green, blue = probe.radiance
-        name = scene.nodes[probe.node].name if probe.node in scene.nodes else "background"
+        node = scene.nodes.get(probe.node) if probe.node is not None else None
+        name = node.name if node is not None else "background"
         place = f", {probe.distance:.2f} m" if math.isfinite(probe.distance) else ""
         self.pixel.setText(f"{name}{place}: {red:.3g} {green:.3g} {blue:.3g}")
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -68,7 +69,7 @@ class LightingPanel(Panel):
         self.add.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
         menu = QMenu(self.add)
         for text, make in LAMPS.items():
-            menu.addAction(text, lambda m=make, t=text: self.add_lamp(t, m))
+            menu.addAction(text, partial(self.add_lamp, text, make))
         self.add.setMenu(menu)
         remove = self.tool("delete", "Delete the light")
         remove.clicked.connect(self._remove)
@@ -223,7 +224,8 @@ def thumbnail(image: Image, width: int, height: int) -> npt.NDArray[np.float32]:
     blocks = pixels[: rows * step, : columns * step].reshape(rows, step, columns, step, -1)
     small = blocks.mean(axis=(1, 3))
     clipped = np.minimum(small, np.percentile(small, 95))
-    return (small * (0.25 / max(float(clipped.mean()), 1e-12))).astype(np.float32)
+    made: npt.NDArray[np.float32] = np.asarray(small * (0.25 / max(float(clipped.mean()), 1e-12)), np.float32)
+    return made
 
 
 def _above(scene: Scene) -> tuple[tuple[float, float, float], float]:

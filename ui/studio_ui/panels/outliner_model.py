@@ -91,7 +91,7 @@ class OutlinerModel(QAbstractItemModel):
     def parent(self, index: Index = _ROOT) -> QModelIndex:  # type: ignore[override]
         """The row above."""
         node = self.node(index)
-        above = self._scene.nodes[node].parent if node in self._scene.nodes else None
+        above = self._scene.nodes[node].parent if node is not None and node in self._scene.nodes else None
         return self.of(above) if above is not None else QModelIndex()
 
     def rowCount(self, parent: Index = _ROOT) -> int:

@@ -103,7 +103,7 @@ def clear(layout: QVBoxLayout) -> None:
     """Remove everything in a column."""
     while layout.count():
         item = layout.takeAt(0)
-        widget = item.widget()
+        widget = item.widget() if item is not None else None
         if widget is not None:
             widget.hide()
             widget.deleteLater()
