@@ -100,15 +100,16 @@ def blank_layer(mesh: ShadingPoints) -> LayerRadiance:
 def split_light(tree: LightTree, level: int) -> list[tuple[Directions, F32]]:
     """Directions and radiance to sum over: the leaves of 2^level, the brightest of them in quarters.
 
-    One visibility ray stands for a leaf. Where a leaf holds over `HEAVY` of all light, the error of a
-    shadow's edge in it would show, so its four parts are looked at one by one (up to 2^17).
+    One visibility ray stands for a leaf. Where a leaf holds over `HEAVY` of all light (and four times its
+    even share), the error of a shadow's edge in it would show, so its four parts are looked at one by one
+    (up to 2^17).
     """
     leaves = np.array(tree.coarsened(level).radiance)
     found: list[tuple[Directions, F32]] = [(direction_set(level), leaves)]
     if level + 2 > tree.k:
         return found
     light = leaves.sum(axis=1)
-    heavy = np.flatnonzero(light > HEAVY * light.sum())
+    heavy = np.flatnonzero(light > max(HEAVY, 4 / len(light)) * light.sum())
     if len(heavy):
         leaves[heavy] = 0
         parts = DirectionList(level + 2, (heavy[:, None] * 4 + np.arange(4)).ravel())
