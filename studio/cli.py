@@ -253,6 +253,14 @@ def _picture_options(verb: argparse.ArgumentParser) -> None:
     verb.add_argument(
         "--antialias", type=int, choices=range(1, 9), default=2, metavar="N", help="N×N samples a pixel"
     )
+    verb.add_argument(
+        "--measure",
+        type=int,
+        nargs="?",
+        const=256,
+        metavar="N",
+        help="also measure the picture's error by brute force at N random places (256)",
+    )
 
 
 if __name__ == "__main__":

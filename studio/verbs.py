@@ -148,6 +148,8 @@ def _check_picture(options: argparse.Namespace) -> tuple[int, int]:
         raise InputError(
             f"--exposure {options.exposure:g}: expected -{MOST_EXPOSURE:g} to {MOST_EXPOSURE:g} EV"
         )
+    if options.measure is not None and not 1 <= options.measure <= 100_000:
+        raise InputError(f"--measure {options.measure}: expected 1 to 100000 places")
     needed, there = width * height * options.antialias**2 * SAMPLE_BYTES, memory()
     if needed > there:
         raise InputError(
@@ -167,7 +169,7 @@ def memory() -> float:
 def render(options: argparse.Namespace, program: Headless) -> None:
     """`lucarne render`."""
     from studio_core.imaging.picture import write_picture
-    from studio_core.shading.offline import picture, scene_view
+    from studio_core.shading.offline import measured_picture, scene_view
 
     width, height = _check_picture(options)
     backend, params = chosen_backend(options, program)
@@ -178,7 +180,8 @@ def render(options: argparse.Namespace, program: Headless) -> None:
         program.say(f"{options.project} has no light: the picture is black")
     view = dataclasses.replace(scene_view(scene, options.camera, width, height), antialias=options.antialias)
     with program.job("Rendering") as job:
-        made = picture(scene, view, backend, params, program.services, job)
+        places = options.measure or 0
+        made, error = measured_picture(scene, view, backend, params, program.services, places, job)
     write_picture(options.out, made.linear, exposure=options.exposure, kind=options.tonemap)
     finite = bool(np.isfinite(made.linear).all())
     if not finite:
@@ -197,7 +200,11 @@ def render(options: argparse.Namespace, program: Headless) -> None:
         "mean": float(made.linear.mean(dtype=np.float64)) if finite else None,
         "counts": dict(made.radiance.counts),
     }
-    result(options, program, values, f"{options.out}: {width}×{height}, {vertices} vertices")
+    text = f"{options.out}: {width}×{height}, {vertices} vertices"
+    if error is not None:
+        values["error"] = error.as_dict()
+        text += f", error {error.picture}"
+    result(options, program, values, text)
 
 
 def radiance(options: argparse.Namespace, program: Headless) -> None:

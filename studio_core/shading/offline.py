@@ -17,7 +17,8 @@ from studio_core.scene.bounds import scene_bounds
 from studio_core.scene.diff import Changes
 from studio_core.scene.nodes import Camera, Scene
 from studio_core.session import View, framing
-from studio_core.shading.artifacts import Casters, Picture, Radiance
+from studio_core.shading.artifacts import Casters, MeasuredError, Picture, Radiance
+from studio_core.shading.error_meter import ErrorMeter
 from studio_core.shading.frame import Frame
 from studio_core.shading.job import Job
 from studio_core.shading.pipeline import Pipeline
@@ -78,6 +79,20 @@ def picture(
     scene: Scene, view: View, backend: ShadingBackend, params: Any, services: Services, job: Job | None = None
 ) -> Picture:
     """The picture that `view` sees, scene-linear."""
+    return measured_picture(scene, view, backend, params, services, 0, job)[0]
+
+
+def measured_picture(
+    scene: Scene,
+    view: View,
+    backend: ShadingBackend,
+    params: Any,
+    services: Services,
+    places: int,
+    job: Job | None = None,
+) -> tuple[Picture, MeasuredError | None]:
+    """The same, with its error measured at so many random places; None for 0, or where nothing is seen."""
     pipeline = Pipeline([*backend.stages(services), PictureStage(services)])
-    made: Picture = pipeline.update(Frame(scene, view, params, 1), Changes(), job or Job("Rendering"))
-    return made
+    frame, job = Frame(scene, view, params, 1), job or Job("Rendering")
+    made: Picture = pipeline.update(frame, Changes(), job)
+    return made, ErrorMeter(services, places)(pipeline, frame, job) if places else None

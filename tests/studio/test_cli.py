@@ -768,3 +768,18 @@ def test_the_reference_names_every_verb_and_option() -> None:
         assert told <= there, name
         assert there - everywhere - {"--out", "-h"} <= told, name
         assert everywhere - there <= {"--json"}, name
+
+
+def test_render_measures_its_own_error(run: Run, room: Path) -> None:
+    said = run("render", room, "-o", "x.png", "--size", "48x27", "--json", *QUICK, "--measure", 50)
+    error = json.loads(said.out)["error"]
+    assert error["picture"]["places"] == 50
+    assert 0 < error["picture"]["relative_rmse"] < 2
+    assert error["vertices"]["relative_rmse"] > 0
+    assert len(error["layers"]) >= 1
+
+
+def test_measuring_nowhere_is_refused(run: Run, room: Path) -> None:
+    said = run("render", room, "-o", "x.png", "--measure", 0)
+    assert said.status == 2
+    assert "--measure" in said.err
