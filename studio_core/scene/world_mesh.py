@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import dataclasses
 from collections import OrderedDict
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -115,26 +116,26 @@ class WorldMesh:
         raise KeyError(node)
 
     def moved(self, index: int, transform: Transform) -> WorldMesh:
-        """With one object elsewhere. Its mesh stays as finely split as it was; all else is shared."""
-        placed = dataclasses.replace(self.objects[index], transform=transform)
-        objects = (*self.objects[:index], placed, *self.objects[index + 1 :])
-        where = self.vertices_of(index)
+        """With one object elsewhere; see `moved_many`."""
+        return self.moved_many({index: transform})
 
-        def patched(old: F32, new: F32) -> F32:
-            made = old.copy()
-            made[where] = new
-            return readonly(made, np.float32)
+    def moved_many(self, transforms: Mapping[int, Transform]) -> WorldMesh:
+        """With objects, by index, elsewhere; itself when none of them moves.
 
-        positions, normals, geometric, inset, area = _placed(placed, self.origin)
-        return dataclasses.replace(
-            self,
-            objects=objects,
-            positions=patched(self.positions, positions),
-            normals=patched(self.normals, normals),
-            geometric=patched(self.geometric, geometric),
-            inset=patched(self.inset, inset),
-            area=patched(self.area, area),
-        )
+        Meshes stay as finely split as they were; all else is shared.
+        """
+        objects = list(self.objects)
+        moving = {i: t for i, t in transforms.items() if objects[i].transform != t}
+        if not moving:
+            return self
+        arrays = [a.copy() for a in (self.positions, self.normals, self.geometric, self.inset, self.area)]
+        for index, transform in moving.items():
+            objects[index] = dataclasses.replace(objects[index], transform=transform)
+            for array, part in zip(arrays, _placed(objects[index], self.origin), strict=True):
+                array[self.vertices_of(index)] = part
+        names = ("positions", "normals", "geometric", "inset", "area")
+        fresh: dict[str, Any] = {n: readonly(a, np.float32) for n, a in zip(names, arrays, strict=True)}
+        return dataclasses.replace(self, objects=tuple(objects), **fresh)
 
     def with_mesh(self, index: int, mesh: ShadingMesh) -> WorldMesh:
         """With another shading mesh (a refined one) for one object; later objects' numbers shift."""

@@ -109,6 +109,18 @@ def test_moving_one_object_is_the_same_as_placing_it_there(
     same(moved.moved(index, world.objects[index].transform), world)
 
 
+def test_moving_many_is_moving_one_after_the_other() -> None:
+    world = scene()
+    there = {k: Transform((k, 1.0, -2.0), scale=1.0 + k) for k in (3, 0, 2)}
+    one_by_one = world
+    for index, transform in there.items():
+        one_by_one = one_by_one.moved(index, transform)
+    made = world.moved_many({**there, 1: world.objects[1].transform})
+    same(made, one_by_one)
+    assert made.objects == one_by_one.objects
+    assert world.moved_many({k: placed.transform for k, placed in enumerate(world.objects)}) is world
+
+
 def test_far_scenes_keep_their_precision_about_an_origin() -> None:
     far = Transform((1e6, 0.0, -2e6))
     world = world_mesh([("floor", floor(), far, (0,))], 0.1, origin=far.translation)
