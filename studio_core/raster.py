@@ -11,12 +11,13 @@ from studio_core.contract import Registry, Services
 from studio_core.kernels.compose import background_samples, shade_samples
 from studio_core.parallel import Workers
 from studio_core.scene.diff import Aspect
-from studio_core.scene.nodes import Environment, Light, Scene
+from studio_core.scene.nodes import Light, Scene
 from studio_core.session import View
 from studio_core.shading.artifacts import TERMS, Hits, Picture, Radiance, Surfaces
 from studio_core.shading.frame import Frame
 from studio_core.shading.job import Job
-from studio_core.shading.materials import Resolved, coefficients, resolve
+from studio_core.shading.lamps import shown_environment
+from studio_core.shading.materials import Resolved, coefficients, linear_rgb, resolve
 from studio_core.shading.pipeline import Inputs
 from studio_core.shading.stages import pinhole
 
@@ -140,8 +141,8 @@ class Compositor:
         job: Job | None,
     ) -> None:
         lights = {light.id: light for light in scene.of(Light) if scene.shown(light.id)}
-        shown = (light for light in lights.values() if isinstance(light, Environment))
-        self.environment = next((e for e in shown if e.background), None)
+        environment = shown_environment(scene)
+        self.environment = environment if environment is not None and environment.background else None
         self.surfaces = radiance.surfaces
         self.terms = radiance.combined(lights).reshape(-1, TERMS * 3)
         self.table = table
@@ -193,7 +194,7 @@ class Compositor:
         if self.environment is None:
             return
         rotation = np.ascontiguousarray(self.environment.rotation().matrix()[:3, :3].T, np.float32)
-        pixels = np.ascontiguousarray(self.environment.image.pixels[..., :3], np.float32)
+        pixels = linear_rgb(self.environment.image)
         gain = np.array(self.environment.gain(), np.float32)
 
         def look(start: int, stop: int) -> None:

@@ -20,7 +20,7 @@ from studio_core.signal import Signal
 class View:
     """A pinhole camera: world from camera, vertical angle in degrees, pixels, orbit distance in metres.
 
-    A pixel is the mean of `antialias`² samples.
+    A pixel is the mean of `antialias`² samples. Raises ValueError for a view of nothing.
     """
 
     transform: Transform = IDENTITY
@@ -29,6 +29,10 @@ class View:
     height: int = 540
     focus: float = 3.0
     antialias: int = 2
+
+    def __post_init__(self) -> None:
+        if min(self.width, self.height, self.antialias) < 1 or not 0 < self.fov < 180:
+            raise ValueError("a view needs pixels, samples in them, and an angle between 0 and 180°")
 
     @classmethod
     def of(cls, camera: Camera, scene: Scene, width: int, height: int) -> View:

@@ -119,9 +119,15 @@ def diff(before: Scene, after: Scene) -> Changes:
         aspects |= Aspect.STRUCTURE
     for aspect in nodes.values():
         aspects |= aspect
+    if _environments(before) != _environments(after):  # the first that is shown gives the light
+        aspects |= Aspect.LIGHT
     if not aspects and tuple(before.nodes) != tuple(after.nodes):
         aspects = Aspect.NAME
     return Changes(frozen_map(nodes), frozenset(materials), aspects)
+
+
+def _environments(scene: Scene) -> list[NodeId]:
+    return [node.id for node in scene.of(Environment)]
 
 
 def _casting_changed(before: Scene, after: Scene, material: MaterialId) -> bool:

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, TypeAlias, Union
 import numpy as np
 import numpy.typing as npt
 
+from studio_core.scene.geometry import Geometry
 from studio_core.scene.nodes import Environment, Light, MaterialId, NodeId
 from studio_core.scene.transform import Transform
 from studio_core.session import View
@@ -22,6 +23,8 @@ if TYPE_CHECKING:
     from studio_core.kernels.raycast import RayCaster
     from studio_core.scene.world_mesh import WorldMesh
 
+Source: TypeAlias = tuple[NodeId, Geometry, tuple[MaterialId, ...]]
+"""An object, its mesh, the material of each slot."""
 TERMS = 3  # most terms a BRDF may have; kernels and canvases have room for these
 
 F32 = npt.NDArray[np.float32]
@@ -45,17 +48,22 @@ class ChosenPoints:
 
 @dataclass(frozen=True)
 class Surfaces:
-    """What is lit: the shading meshes of all shown objects in the world.
+    """What is lit: the shading meshes of all shown objects in the world, made from `sources`.
 
     `mesh.material` indexes `materials`; `opacity` is per material; `budget` is how many vertices were
     asked for.
     """
 
-    nodes: tuple[NodeId, ...]
+    sources: tuple[Source, ...]
     materials: tuple[MaterialId, ...]
     mesh: WorldMesh
     opacity: F32
     budget: int
+
+    @property
+    def nodes(self) -> tuple[NodeId, ...]:
+        """The objects, in the order of `mesh.objects`."""
+        return tuple(node for node, _, _ in self.sources)
 
 
 ShadingPoints: TypeAlias = Union["WorldMesh", ChosenPoints]
@@ -238,5 +246,6 @@ __all__ = [
     "Radiance",
     "ShadingPoints",
     "Shapes",
+    "Source",
     "Surfaces",
 ]

@@ -50,6 +50,10 @@ class VisibilityBits:
         self.rays = 0
         self.skipped = 0
 
+    def belongs_to(self, mesh: ShadingPoints, shadow: RayCaster) -> bool:
+        """Whether it was traced from these points; a mesh that moves is another one."""
+        return self._mesh is mesh and self._shadow is shadow
+
     def of(self, points: Points, directions: Directions, job: Job) -> npt.NDArray[np.uint64]:
         """(len(points), S/64) words; kept unless all vertices would need over 1 GiB."""
         count, words = len(self._mesh.positions), directions.size // 64

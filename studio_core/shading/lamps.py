@@ -7,11 +7,17 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from studio_core.scene.nodes import AreaLamp, DirectionalLamp, Light, PointLamp, Scene, SpotLamp
+from studio_core.scene.nodes import AreaLamp, DirectionalLamp, Environment, Light, PointLamp, Scene, SpotLamp
+from studio_core.scene.transform import rotation_matrix
 from studio_core.shading.artifacts import Lamp
 
 F32 = npt.NDArray[np.float32]
 F64 = npt.NDArray[np.float64]
+
+
+def shown_environment(scene: Scene) -> Environment | None:
+    """The environment that lights the scene and is seen behind it: the first that is not hidden."""
+    return next((node for node in scene.of(Environment) if scene.shown(node.id)), None)
 
 
 def lamps(scene: Scene) -> tuple[Lamp, ...]:
@@ -21,9 +27,8 @@ def lamps(scene: Scene) -> tuple[Lamp, ...]:
         kind = _KINDS.get(type(node))
         if kind is None or not scene.shown(node.id):
             continue
-        world = scene.world(node.id).matrix()
-        right, up, back = (world[:3, i] / np.linalg.norm(world[:3, i]) for i in range(3))
-        scale = float(np.linalg.norm(world[:3, 0]))
+        world = scene.world(node.id)
+        right, up, back = rotation_matrix(world.rotation).T
         cos_cone = cos_inner = -1.0
         angle = 0.0
         if isinstance(node, SpotLamp):
@@ -32,8 +37,9 @@ def lamps(scene: Scene) -> tuple[Lamp, ...]:
         elif isinstance(node, DirectionalLamp):
             angle = math.radians(node.angle)
         elif isinstance(node, AreaLamp):
-            right, up = right * node.width * scale, up * node.height * scale
-        found.append(Lamp(node.id, kind, world[:3, 3], -back, right, up, cos_cone, cos_inner, angle))
+            right, up = right * node.width * world.scale, up * node.height * world.scale
+        place = np.array(world.translation)
+        found.append(Lamp(node.id, kind, place, -back, right, up, cos_cone, cos_inner, angle))
     return tuple(found)
 
 

@@ -86,14 +86,12 @@ def coefficients(resolved: Resolved) -> npt.NDArray[np.float32]:
     }
     size = max((t.image.pixels.shape[:2] for t in resolved.textures.values()), default=None)
     for name, texture in resolved.textures.items():
-        texels = linear(texture.image)[::-1]
+        texels = linear_rgb(texture.image)[::-1]
         if size is not None and texels.shape[:2] != size:
             rows = np.arange(size[0]) * texels.shape[0] // size[0]
             columns = np.arange(size[1]) * texels.shape[1] // size[1]
             texels = texels[rows][:, columns]
-        scalar = values[name].ndim == 0
-        texels = texels[..., 0] if scalar else np.broadcast_to(texels[..., :3], (*texels.shape[:2], 3))
-        values[name] = values[name] * texels
+        values[name] = values[name] * (texels[..., 0] if values[name].ndim == 0 else texels)
     if size is not None:
         for name, value in values.items():
             tail = value.shape[-1:] if value.ndim in (1, 3) else ()
@@ -130,4 +128,10 @@ def linear(image: Image) -> npt.NDArray[np.float32]:
     return straight
 
 
-__all__ = ["Resolved", "coefficients", "linear", "resolve", "same_shapes", "shapes"]
+def linear_rgb(image: Image) -> npt.NDArray[np.float32]:
+    """(H, W, 3) scene-linear, contiguous; grey is taken for all three, alpha is left out."""
+    pixels = linear(image)[..., :3]
+    return np.ascontiguousarray(np.broadcast_to(pixels, (*pixels.shape[:2], 3)))
+
+
+__all__ = ["Resolved", "coefficients", "linear", "linear_rgb", "resolve", "same_shapes", "shapes"]

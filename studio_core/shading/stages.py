@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,15 +18,16 @@ from studio_core.kernels.raycast import CasterObject, RayCaster
 from studio_core.params import param
 from studio_core.scene.bounds import scene_bounds
 from studio_core.scene.diff import Aspect
-from studio_core.scene.nodes import Environment, MeshObject, Scene
+from studio_core.scene.nodes import Environment, MaterialId, MeshObject, Scene
 from studio_core.scene.shading_mesh import BUDGET, NO_BACK, choose_edge
+from studio_core.scene.transform import rotation_matrix
 from studio_core.scene.world_mesh import MeshCache, world_mesh
 from studio_core.session import View
-from studio_core.shading.artifacts import Casters, Hits, Lighting, Shapes, Surfaces
+from studio_core.shading.artifacts import Casters, Hits, Lighting, Shapes, Source, Surfaces
 from studio_core.shading.frame import Frame
 from studio_core.shading.job import Job
-from studio_core.shading.lamps import lamps
-from studio_core.shading.materials import same_shapes, shapes
+from studio_core.shading.lamps import lamps, shown_environment
+from studio_core.shading.materials import linear_rgb, same_shapes, shapes
 from studio_core.shading.pipeline import Inputs
 
 F32 = npt.NDArray[np.float32]
@@ -54,38 +56,41 @@ class SurfaceStage:
 
     needs: tuple[type, ...] = ()
     gives = Surfaces
-    dirtied_by = BODIES | Aspect.TRANSFORM | Aspect.QUALITY
+    dirtied_by = BODIES | Aspect.TRANSFORM | Aspect.MATERIAL | Aspect.QUALITY
 
     def __init__(self) -> None:
         self._cache = MeshCache()
 
     def run(self, frame: Frame, inputs: Inputs, job: Job) -> Surfaces:
-        """Only what moved is transformed again when nothing else changed."""
+        """The previous where no object differs; where some only moved, just these are transformed again."""
         scene = frame.scene
-        objects = [node for node in scene.of(MeshObject) if scene.shown(node.id)]
-        nodes = tuple(node.id for node in objects)
+        shown = (node for node in scene.of(MeshObject) if scene.shown(node.id))
+        sources = tuple((node.id, node.geometry, node.materials) for node in shown)
         budget = int(getattr(frame.params, "vertices", BUDGET))
         old: Surfaces | None = inputs.previous
-        if old is None or inputs.changes.aspects & BODIES or old.budget != budget or old.nodes != nodes:
-            return self._build(scene, objects, budget)
-        mesh = old.mesh
-        for node_id in inputs.changes.of(Aspect.TRANSFORM):
-            if node_id in nodes:
-                mesh = mesh.moved(nodes.index(node_id), scene.world(node_id))
-        return old if mesh is old.mesh else dataclasses.replace(old, mesh=mesh)
+        if old is None or old.budget != budget or old.sources != sources:
+            return self._build(scene, sources, budget)
+        opacity = _opacity(scene, old.materials)
+        mesh = old.mesh.moved_many({i: scene.world(node) for i, node in enumerate(old.nodes)})
+        if mesh is old.mesh and np.array_equal(opacity, old.opacity):
+            return old
+        return dataclasses.replace(old, mesh=mesh, opacity=opacity)
 
-    def _build(self, scene: Scene, objects: list[MeshObject], budget: int) -> Surfaces:
+    def _build(self, scene: Scene, sources: tuple[Source, ...], budget: int) -> Surfaces:
         table: dict[str, int] = {}
         items = []
-        for node in objects:
-            slots = [table.setdefault(material, len(table)) for material in node.materials]
-            items.append((node.id, node.geometry, scene.world(node.id), slots))
+        for node, geometry, materials in sources:
+            slots = [table.setdefault(material, len(table)) for material in materials]
+            items.append((node, geometry, scene.world(node), slots))
         sizes = [(geometry, world.scale) for _, geometry, world, _ in items]
         edge = choose_edge(sizes, budget, prepared=self._cache.prepared)
         low, high = scene_bounds(scene)
         mesh = world_mesh(items, edge, origin=np.round((low + high) / 2), cache=self._cache)
-        opacity = np.array([scene.material(material).opacity for material in table], np.float32)
-        return Surfaces(tuple(node.id for node in objects), tuple(table), mesh, opacity, budget)
+        return Surfaces(sources, tuple(table), mesh, _opacity(scene, table), budget)
+
+
+def _opacity(scene: Scene, materials: Iterable[MaterialId]) -> F32:
+    return np.array([scene.material(material).opacity for material in materials], np.float32)
 
 
 class CasterStage:
@@ -106,6 +111,8 @@ class CasterStage:
         transforms = tuple(scene.world(node) for node in surfaces.nodes)
         previous: Casters | None = inputs.previous
         if previous is not None and previous.meshes == meshes:
+            if previous.transforms == transforms:
+                return previous
             for index, (now, before) in enumerate(zip(transforms, previous.transforms, strict=True)):
                 if now != before:
                     previous.shadow.move(index, now.matrix())
@@ -114,7 +121,7 @@ class CasterStage:
         shadow, primary = [], []
         for node, part, key, stops, transform in zip(objects, parts, keys, opaque, transforms, strict=True):
             mesh, matrix = node.geometry, transform.matrix()
-            faces = np.array(stops)[mesh.slots]
+            faces = np.array(stops, np.bool_)[mesh.slots]
             shadow.append(CasterObject(mesh.positions, mesh.faces, mesh.key, matrix, faces))
             primary.append(CasterObject(part.positions, part.faces, key, matrix, None))
         job.checkpoint()
@@ -156,8 +163,7 @@ class LightingStage:
     def run(self, frame: Frame, inputs: Inputs, job: Job) -> Lighting:
         """Integrates again only for another picture, rotation or finer directions."""
         scene = frame.scene
-        found = (node for node in scene.of(Environment) if scene.shown(node.id))
-        environment = next(found, None)
+        environment = shown_environment(scene)
         tree: LightTree | None = None
         key: tuple[object, ...] = ()
         if environment is not None:
@@ -166,7 +172,7 @@ class LightingStage:
             if previous is not None and previous.integrated == key:
                 tree = previous.tree
             else:
-                turned = previous is not None and previous.integrated[0] == key[0]
+                turned = previous is not None and previous.integrated[:1] == key[:1]
                 tree = LightTree.build(self._leaves(environment, key, job, keep=not turned))
         return Lighting(environment, tree, lamps(scene), key)
 
@@ -177,7 +183,7 @@ class LightingStage:
             found: F32 = kept["leaves"]
             return found
         rotation = environment.rotation().matrix()[:3, :3]
-        pixels = environment.image.pixels[..., :3]
+        pixels = linear_rgb(environment.image)
         leaves = integrate_environment(pixels, rotation, LARGEST, self._workers, job)
         if self._cache is not None and keep:  # not every step of a turn
             self._cache.put({"leaves": leaves}, method, *key)
@@ -241,8 +247,8 @@ class PrimaryStage:
         mesh = surfaces.mesh
         if depth == LAYERS or not len(samples):
             return hits
-        clear = surfaces.opacity[mesh.face_material[np.maximum(hits.face, 0)]] < 1
-        through = np.flatnonzero((hits.face >= 0) & clear)
+        met = np.flatnonzero(hits.face >= 0)
+        through = met[surfaces.opacity[mesh.face_material[hits.face[met]]] < 1]
         if not len(through):
             return hits
         directions = np.empty((len(through), 3), np.float32)
@@ -261,7 +267,7 @@ class PrimaryStage:
 def pinhole(view: View) -> npt.NDArray[np.float64]:
     """A view as `kernels.camera` wants it."""
     up = np.tan(np.radians(view.fov) / 2)
-    rotation = view.transform.matrix()[:3, :3] / view.transform.scale
+    rotation = rotation_matrix(view.transform.rotation)
     size = (view.width, view.antialias, up * view.width / view.height, up, view.height)
     return np.array([*size, *rotation.ravel()], np.float64)
 

@@ -55,8 +55,12 @@ class VisibilityStage:
         self._workers = services.workers
 
     def run(self, frame: Frame, inputs: Inputs, job: Job) -> VisibilityBits:
-        """Empty; it fills as light is summed."""
-        return VisibilityBits(inputs[Surfaces].mesh, inputs[Casters].shadow, self._workers)
+        """Empty, it fills as light is summed; the previous one while nothing has moved."""
+        mesh, shadow = inputs[Surfaces].mesh, inputs[Casters].shadow
+        previous: VisibilityBits | None = inputs.previous
+        if previous is not None and previous.belongs_to(mesh, shadow):
+            return previous
+        return VisibilityBits(mesh, shadow, self._workers)
 
 
 class ReferenceStage:
