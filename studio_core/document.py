@@ -6,7 +6,9 @@ made new. Used from one thread only, the one that made it.
 
 from __future__ import annotations
 
+import itertools
 import threading
+from collections import deque
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -54,7 +56,11 @@ class Gesture:
 
 
 class Document:
-    """`changed(before, after, changes)` is emitted after every change, also undo and redo."""
+    """`changed(before, after, changes)` is emitted after every change, also undo and redo.
+
+    A receiver may edit: that is done at once, and told when everybody has heard of what came before. A
+    receiver's error is raised by whatever made the change, which is then done and was told to all others.
+    """
 
     def __init__(self, scene: Scene | None = None, *, history_bytes: int = 256 << 20) -> None:
         self._thread = threading.get_ident()
@@ -64,6 +70,8 @@ class Document:
         self._scene = self._steps[0].scene
         self._gesture: Gesture | None = None
         self._history_bytes = history_bytes
+        self._untold: deque[tuple[Scene, Scene]] = deque()
+        self._telling = False
         self.changed: Signal[[Scene, Scene, Changes]] = Signal()
         self.saved_scene: Scene | None = self._scene
 
@@ -163,12 +171,13 @@ class Document:
         return True
 
     def restore(self, steps: tuple[Step, ...], position: int) -> None:
-        """Take over a history that was read from a project file."""
+        """Take over a history that was read from a project file; none of it goes before the next edit."""
         self._assert_thread()
         if not 0 <= position < len(steps):
             raise EditError("the history does not hold that step")
         self._gesture = None
-        self._steps, self._costs, self._at = list(steps), [0] * len(steps), position
+        costs = [_cost(before.scene, after.scene) for before, after in itertools.pairwise(steps)]
+        self._steps, self._costs, self._at = list(steps), [0, *costs], position
         self.saved_scene = steps[position].scene
         self._show(self.saved_scene)
 
@@ -178,16 +187,28 @@ class Document:
 
     def _show(self, after: Scene) -> None:
         before, self._scene = self._scene, after
-        changes = diff(before, after)
         if before is not after:
-            self.changed.emit(before, after, changes)
+            self._untold.append((before, after))
+        if self._telling:
+            return
+        first: Exception | None = None
+        self._telling = True
+        try:
+            while self._untold:
+                before, after = self._untold.popleft()
+                try:
+                    self.changed.emit(before, after, diff(before, after))
+                except Exception as error:
+                    first = first or error
+        finally:
+            self._telling = False
+        if first is not None:
+            raise first
 
     def _push(self, step: Step) -> None:
         del self._steps[self._at + 1 :], self._costs[self._at + 1 :]
-        before = _parts(self._steps[-1].scene)
-        new = sum(size for part, size in _parts(step.scene).items() if part not in before)
+        self._costs.append(_cost(self._steps[-1].scene, step.scene))
         self._steps.append(step)
-        self._costs.append(new + _ENTRY_BYTES * len(step.scene.nodes))
         self._at += 1
         total = sum(self._costs)
         while len(self._steps) > 2 and total > self._history_bytes:
@@ -202,6 +223,13 @@ class Document:
     def _assert_thread(self) -> None:
         if threading.get_ident() != self._thread:
             raise RuntimeError("the document was touched from another thread")
+
+
+def _cost(before: Scene, after: Scene) -> int:
+    """Bytes that `after` adds to `before`."""
+    there = _parts(before)
+    new = sum(size for part, size in _parts(after).items() if part not in there)
+    return new + _ENTRY_BYTES * len(after.nodes)
 
 
 def _parts(scene: Scene) -> dict[int, int]:

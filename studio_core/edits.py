@@ -11,12 +11,14 @@ from collections.abc import Container, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
+import numpy as np
+
 from studio_core.arrays import frozen_map
 from studio_core.errors import EditError, InputError
 from studio_core.params import ParamInfo, Value, check, param_infos
 from studio_core.scene.geometry import Geometry, Image, Texture
 from studio_core.scene.nodes import Material, MaterialId, MeshObject, Node, NodeId, Scene, new_id
-from studio_core.scene.transform import Transform
+from studio_core.scene.transform import IDENTITY, Transform
 
 
 class Edit(Protocol):
@@ -28,7 +30,7 @@ class Edit(Protocol):
         ...
 
     def __call__(self, scene: Scene) -> Scene:
-        """The changed scene; equal content may come back as the same object."""
+        """The changed scene; the same object where nothing differs."""
         ...
 
 
@@ -70,6 +72,8 @@ class Remove:
     label: str = "Delete"
 
     def __call__(self, scene: Scene) -> Scene:
+        if not self.nodes:
+            return scene
         gone = {below for node in self.nodes for below in scene.subtree(node)}
         kept = {node_id: node for node_id, node in scene.nodes.items() if node_id not in gone}
         return dataclasses.replace(scene, nodes=frozen_map(kept))
@@ -111,14 +115,18 @@ class Reparent:
     label: str = "Re-parent"
 
     def __call__(self, scene: Scene) -> Scene:
-        above = scene.world(self.parent).inverse() if self.parent is not None else Transform()
         for node_id in self.nodes:
             if self.parent is not None and self.parent in scene.subtree(node_id):
                 raise EditError("a node cannot hang under itself")
             node = scene[node_id]
             if node.parent == self.parent:
                 continue
-            local = above @ scene.world(node_id)
+            try:
+                with np.errstate(all="ignore"):
+                    above = scene.world(self.parent).inverse() if self.parent is not None else IDENTITY
+                    local = above @ scene.world(node_id)
+            except ValueError as error:
+                raise EditError(f"{node.name!r} cannot hang there: {error}") from None
             scene = scene.with_nodes(dataclasses.replace(node, parent=self.parent, transform=local))
         return scene
 
@@ -143,6 +151,8 @@ class Order:
                 made[node_id] = node
         if self.before is None:
             made |= moving
+        if tuple(made) == tuple(scene.nodes):
+            return scene
         return dataclasses.replace(scene, nodes=frozen_map(made))
 
 

@@ -25,6 +25,20 @@ class Signal(Generic[P]):
         return disconnect
 
     def emit(self, *args: P.args, **kwargs: P.kwargs) -> None:
-        """Call every receiver; one connected meanwhile waits for the next emit."""
+        """Call every receiver; one connected meanwhile waits for the next emit, one that left is not called.
+
+        An error of one keeps no other from being called: the first is raised in the end, with a note of
+        each later one.
+        """
+        first: Exception | None = None
         for receiver in tuple(self._receivers):
-            receiver(*args, **kwargs)
+            try:
+                if receiver in self._receivers:
+                    receiver(*args, **kwargs)
+            except Exception as error:
+                if first is None:
+                    first = error
+                else:
+                    first.add_note(f"another receiver failed as well: {error!r}")
+        if first is not None:
+            raise first

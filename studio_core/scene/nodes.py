@@ -195,9 +195,12 @@ class Scene:
 
     def subtree(self, node: NodeId) -> list[NodeId]:
         """The node and everything under it."""
+        below: dict[NodeId | None, list[NodeId]] = {}
+        for child in self.nodes.values():
+            below.setdefault(child.parent, []).append(child.id)
         found = [self[node].id]
         for parent in found:
-            found.extend(child.id for child in self.children(parent))
+            found.extend(below.get(parent, ()))
         return found
 
     def world(self, node: NodeId) -> Transform:
@@ -220,10 +223,21 @@ class Scene:
         raise EditError(f"there is no node named {name!r}; the scene has {known}")
 
     def with_nodes(self, *nodes: Node) -> Scene:
-        """The scene with these nodes added or replaced; replaced ones keep their place."""
-        return dataclasses.replace(self, nodes=frozen_map({**self.nodes, **{n.id: n for n in nodes}}))
+        """The scene with these nodes added or replaced; replaced ones keep their place.
+
+        A node that equals the one that is there leaves it alone; so may the whole scene come back.
+        """
+        new = _differing(self.nodes, {n.id: n for n in nodes})
+        return dataclasses.replace(self, nodes=frozen_map({**self.nodes, **new})) if new else self
 
     def with_materials(self, *materials: Material) -> Scene:
-        """The scene with these materials added or replaced."""
-        made = {**self.materials, **{m.id: m for m in materials}}
-        return dataclasses.replace(self, materials=frozen_map(made))
+        """The scene with these materials added or replaced, as with nodes."""
+        new = _differing(self.materials, {m.id: m for m in materials})
+        return dataclasses.replace(self, materials=frozen_map({**self.materials, **new})) if new else self
+
+
+T = TypeVar("T")
+
+
+def _differing(there: Mapping[str, T], new: Mapping[str, T]) -> dict[str, T]:
+    return {key: value for key, value in new.items() if key not in there or there[key] != value}

@@ -401,6 +401,57 @@ def test_a_shared_mesh_costs_once() -> None:
     assert document.history_bytes() - bare < 2000
 
 
+def test_a_receiver_that_fails_keeps_nobody_else_from_hearing() -> None:
+    document = Document(little_scene())
+    told: list[float] = []
+
+    def fails(before: Scene, after: Scene, changes: Changes) -> None:
+        raise ZeroDivisionError("a bug in a panel")
+
+    document.changed.connect(fails)
+    document.changed.connect(lambda _, after, __: told.append(after["cube"].transform.translation[0]))
+    with pytest.raises(ZeroDivisionError):
+        document.apply(move(1.0))
+    assert told == [1.0]
+    assert document.position == 1
+    with pytest.raises(ZeroDivisionError):
+        document.undo()
+    assert told == [1.0, 0.0]
+    assert document.can_redo
+
+
+def test_edits_of_a_receiver_are_heard_in_order_by_all() -> None:
+    document = Document(little_scene())
+    told: list[tuple[Scene, Scene, Changes]] = []
+
+    def follows(before: Scene, after: Scene, changes: Changes) -> None:
+        if after["cube"].transform.translation[0] == 1.0:
+            document.apply(edits.SetFields("cube", {"name": "Moved"}, label="Name"))
+            assert document.scene["cube"].name == "Moved"
+
+    document.changed.connect(follows)
+    document.changed.connect(lambda *change: told.append(change))
+    document.apply(move(1.0))
+    assert [step.label for step in document.history] == ["Open", "Move to 1.0", "Name"]
+    assert [changes.aspects for _, _, changes in told] == [Aspect.TRANSFORM, Aspect.NAME]
+    assert told[0][1] is told[1][0]
+    assert told[1][1] is document.scene
+
+
+def test_a_restored_history_counts_against_the_cap() -> None:
+    def heavy(i: int) -> Scene:
+        mesh = Geometry(np.full((25_000, 3), i, np.float32), np.zeros((1, 3), np.uint32))  # 300 kB
+        return edits.SetGeometry("cube", mesh)(little_scene())
+
+    document = Document(history_bytes=2_000_000)
+    document.restore(tuple(Step(str(i), heavy(i)) for i in range(20)), 19)
+    assert len(document.history) == 20  # opening a project forgets nothing
+    assert document.history_bytes() > 19 * 300_000
+    document.apply(move(1.0))
+    assert 5 <= len(document.history) <= 8
+    assert document.history_bytes() <= 2_000_000
+
+
 def test_another_thread_is_refused() -> None:
     document = Document(little_scene())
     gesture = document.begin("Drag")

@@ -293,6 +293,42 @@ def test_textures_come_and_go() -> None:
 # ---------------------------------------------------------------- duplicates
 
 
+@pytest.mark.parametrize(
+    "edit",
+    [
+        edits.Add(()),
+        edits.Remove(()),
+        edits.Move({}),
+        edits.Move({"cube": Transform((0.0, 0.5, 0.0))}),
+        edits.SetFields("cube", {"name": "Cube", "hidden": False}),
+        edits.SetFields("lamp", {"intensity": 1, "tint": [1, 1, 1]}),
+        edits.Reparent(("chair",), "inner"),
+        edits.Order(("chair",), "lamp"),
+        edits.Order((), None),
+        edits.SetGeometry("cube", SCENE["cube"].geometry),
+        edits.Assign("cube", "paint"),
+        edits.Assign("cube", "paint", 0),
+        edits.SetMaterial("matt", {"base_color": (0.5, 0.5, 0.5)}),
+        edits.SetMaterial("matt", model="lambert", name="Matt", opacity=1.0),
+        edits.SetTexture("matt", "base_color", None),
+        edits.Compound("Nothing", (edits.Remove(()), edits.Move({}))),
+    ],
+    ids=repr,
+)
+def test_what_changes_nothing_gives_the_same_scene(edit: edits.Edit) -> None:
+    assert edit(SCENE) is SCENE
+
+
+@pytest.mark.parametrize(("above", "scale"), [(1e-320, 1.0), (1e-200, 1e200), (1e200, 1e-200)])
+def test_absurd_scales_are_refused_in_a_sentence(above: float, scale: float) -> None:
+    scene = SCENE.with_nodes(
+        Group(id="far", name="Far", transform=Transform((1.0, 0.0, 0.0), scale=above)),
+        Group(id="own", name="Own", transform=Transform((1e200, 0.0, 0.0), scale=scale)),
+    )
+    with pytest.raises(EditError, match="'Own' cannot hang"):
+        edits.Reparent(("own",), "far")(scene)
+
+
 def test_duplicates_share_meshes_and_hang_together() -> None:
     add = edits.duplicate(SCENE, ("outer", "chair"), offset=Transform((1.0, 0.0, 0.0)))
     made = add(SCENE)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pytest
+
 from studio_core.signal import Signal
 
 
@@ -45,6 +47,32 @@ def test_a_receiver_may_leave_or_bring_another_while_it_is_called() -> None:
     assert heard == ["once", "always"]
     signal.emit()
     assert heard == ["once", "always", "always", "late"]
+
+
+def test_every_receiver_is_called_though_one_fails() -> None:
+    signal: Signal[[]] = Signal()
+    heard: list[str] = []
+
+    def fails(error: Exception) -> None:
+        heard.append(str(error))
+        raise error
+
+    signal.connect(lambda: fails(ValueError("first")))
+    signal.connect(lambda: fails(KeyError("second")))
+    signal.connect(lambda: heard.append("third"))
+    with pytest.raises(ValueError, match="first") as caught:
+        signal.emit()
+    assert heard == ["first", "'second'", "third"]
+    assert any("second" in note for note in caught.value.__notes__)
+
+
+def test_who_was_disconnected_meanwhile_is_not_called() -> None:
+    signal: Signal[[]] = Signal()
+    heard: list[str] = []
+    signal.connect(lambda: leave())
+    leave = signal.connect(lambda: heard.append("gone"))
+    signal.emit()
+    assert heard == []
 
 
 def test_two_signals_do_not_share_receivers() -> None:
