@@ -44,7 +44,7 @@ class CoefficientTable:
 
     def __init__(self, registry: Registry) -> None:
         self._registry = registry
-        self._kept: dict[str, tuple[object, list[F32]]] = {}
+        self._kept: dict[str, tuple[object, list[F32], F32]] = {}
 
     def __call__(self, scene: Scene, surfaces: Surfaces) -> Coefficients:
         """The table for `surfaces.materials`."""
@@ -53,15 +53,15 @@ class CoefficientTable:
         uv_scale = np.tile(np.array([1, 1, 0, 0], np.float32), (count, 1))
         rows: list[F32] = []
         length = 0
-        kept: dict[str, tuple[object, list[F32]]] = {}
+        kept: dict[str, tuple[object, list[F32], F32]] = {}
         for m, material_id in enumerate(surfaces.materials):
             material = scene.material(material_id)
             had = self._kept.get(material_id)
-            levels = had[1] if had is not None and had[0] is material else None
-            if levels is None:
-                levels = _pyramid(coefficients(resolve(material, self._registry)))
-            kept[material_id] = (material, levels)
-            uv_scale[m] = _uv_scale(resolve(material, self._registry))
+            if had is None or had[0] is not material:
+                resolved = resolve(material, self._registry)
+                had = material, _pyramid(coefficients(resolved)), _uv_scale(resolved)
+            kept[material_id] = had
+            _, levels, uv_scale[m] = had
             for level, values in enumerate(levels):
                 first[m, level], size[m, level] = length, values.shape[:2]
                 rows.append(values.reshape(-1, TERMS * 3))
@@ -169,7 +169,7 @@ class Compositor:
                 self.pinhole,
                 mesh.faces,
                 mesh.back_faces,
-                mesh.geometric,
+                mesh.positions,
                 mesh.material,
                 mesh.uvs,
                 self.texels,
@@ -208,12 +208,12 @@ def texels_per_metre(surfaces: Surfaces, table: Coefficients) -> F32:
     mesh = surfaces.mesh
     if not (table.size[:, 0] > 1).any() or not len(mesh.faces):
         return np.ones(max(len(mesh.faces), 1), np.float32)
-    corners, uvs = mesh.positions[mesh.faces], mesh.uvs[mesh.faces]
+    corners, uvs = mesh.positions[mesh.faces].astype(np.float64), mesh.uvs[mesh.faces].astype(np.float64)
     cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     area = np.linalg.norm(cross, axis=1)
     a, b = uvs[:, 1] - uvs[:, 0], uvs[:, 2] - uvs[:, 0]
     uv_area = np.abs(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
     m = mesh.face_material
     texels = uv_area * table.uv_scale[m, 0] * table.uv_scale[m, 1] * table.size[m, 0, 0] * table.size[m, 0, 1]
-    made: F32 = np.sqrt(np.abs(texels) / np.maximum(area, 1e-20)).astype(np.float32)
+    made: F32 = np.minimum(np.sqrt(np.abs(texels) / np.maximum(area, 1e-20)), 1e30).astype(np.float32)
     return made

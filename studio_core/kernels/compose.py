@@ -13,6 +13,7 @@ F64 = npt.NDArray[np.float64]
 I32 = npt.NDArray[np.int32]
 I64 = npt.NDArray[np.int64]
 U32 = npt.NDArray[np.uint32]
+ROOT_TWO = 2**0.5
 NO_FACE = np.uint32(0xFFFFFFFF)
 
 
@@ -34,6 +35,20 @@ def texel(table: F32, first: int, height: int, width: int, tu: float, tv: float,
 
 
 @kernel
+def cosine(positions: F32, i: int, j: int, k: int, along: F32) -> float:
+    """Between a direction and a face's normal; > 0: it is met from behind, 0: it has no area."""
+    ax, ay, az = float(positions[i, 0]), float(positions[i, 1]), float(positions[i, 2])
+    bx, by, bz = positions[j, 0] - ax, positions[j, 1] - ay, positions[j, 2] - az
+    cx, cy, cz = positions[k, 0] - ax, positions[k, 1] - ay, positions[k, 2] - az
+    nx, ny, nz = by * cz - bz * cy, bz * cx - bx * cz, bx * cy - by * cx
+    length = np.sqrt(nx * nx + ny * ny + nz * nz)
+    if not length > 0.0:
+        return 0.0
+    made: float = (nx * along[0] + ny * along[1] + nz * along[2]) / length
+    return made
+
+
+@kernel
 def shade_samples(
     start: int,
     stop: int,
@@ -45,7 +60,7 @@ def shade_samples(
     pinhole: F64,
     faces: U32,
     back_faces: U32,
-    geometric: F32,
+    positions: F32,
     material: I32,
     uvs: F32,
     texels_per_metre: F32,
@@ -77,17 +92,21 @@ def shade_samples(
         w0 = np.float32(1) - w1 - w2
         m = material[i]
         first_level = first[m, 0]
-        away = along[0] * geometric[i, 0] + along[1] * geometric[i, 1] + along[2] * geometric[i, 2]
+        away = cosine(positions, i, j, k, along)
         if size[m, 0, 0] == 1 and size[m, 0, 1] == 1:
             for c in range(width):
                 found[c] = table[first_level, c]
         else:
             tu = (w0 * uvs[i, 0] + w1 * uvs[j, 0] + w2 * uvs[k, 0]) * uv_scale[m, 0] + uv_scale[m, 2]
             tv = (w0 * uvs[i, 1] + w1 * uvs[j, 1] + w2 * uvs[k, 1]) * uv_scale[m, 1] + uv_scale[m, 3]
+            tu, tv = tu - np.floor(tu), tv - np.floor(tv)
+            if not (tu >= 0 and tv >= 0):  # too large for any texel
+                tu, tv = 0.0, 0.0
             footprint = distance[n] * pixel_angle * texels_per_metre[f] / np.sqrt(max(abs(away), 0.05))
-            level = int(np.floor(np.log2(max(footprint, 1.0)) + 0.5))
-            while level > 0 and (level >= first.shape[1] or size[m, level, 0] == 0):
-                level -= 1
+            level, wider = 0, ROOT_TWO
+            while footprint >= wider and level + 1 < first.shape[1] and size[m, level + 1, 0] > 0:
+                level += 1
+                wider *= 2
             texel(table, first[m, level], size[m, level, 0], size[m, level, 1], tu, tv, found)
         if away > 0 and back_faces[f, 0] != NO_FACE:
             i, j, k = back_faces[f, 0], back_faces[f, 1], back_faces[f, 2]

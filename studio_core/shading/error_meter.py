@@ -88,7 +88,8 @@ class ErrorMeter:
             shown_layers[layer] = drawn
             lit = dataclasses.replace(radiance, layers={layer: truth[layer]})
             true_layers[layer] = _lit(frame, lit, seen, chosen, uvs, table)
-        shown, true = sum(shown_layers.values()), sum(true_layers.values())
+        dark = np.zeros((len(chosen), 3), np.float32)
+        shown, true = sum(shown_layers.values(), dark), sum(true_layers.values(), dark)
         by_layer = {k: compare(shown_layers[k], true_layers[k]) for k in shown_layers}
         vertices = self._vertices(radiance, shapes, lighting, casters, frame, table, rng, job)
         return MeasuredError(compare(shown, true), vertices, by_layer)
@@ -194,11 +195,11 @@ def _lit(
     uvs: F32,
     table: Coefficients,
 ) -> F32:
-    """(N, 3) radiance of hits whose own light sums are `radiance.layers`: each hit its own vertex."""
+    """(N, 3) radiance of hits whose own light sums are `radiance.layers`: each hit its own face."""
     count, mesh = len(hits.face), radiance.surfaces.mesh
     own = dataclasses.replace(radiance, valid=np.ones(count, np.bool_))
     out = np.zeros((count, 3), np.float32)
-    corner = np.repeat(np.arange(count, dtype=np.uint32)[:, None], 3, axis=1)
+    corner = np.arange(3 * count, dtype=np.uint32).reshape(count, 3)
     view = hits.view
     lens = pinhole(view)
     shade_samples(
@@ -212,11 +213,11 @@ def _lit(
         lens,
         corner,
         np.full_like(corner, NO_BACK),
-        mesh.geometric[mesh.faces[hits.face, 0]],
-        mesh.face_material[hits.face],
-        uvs,
+        mesh.positions[mesh.faces[hits.face].ravel()],
+        np.repeat(mesh.face_material[hits.face], 3),
+        np.repeat(uvs, 3, axis=0),
         texels_per_metre(radiance.surfaces, table)[hits.face],
-        own.combined(_lights(frame)).reshape(count, -1),
+        np.repeat(own.combined(_lights(frame)).reshape(count, -1), 3, axis=0),
         table.table,
         table.first,
         table.size,

@@ -85,6 +85,39 @@ def test_an_open_sheet_is_lit_on_both_sides(services, host):
     assert not dark.any()
 
 
+def tube(sides=24):
+    """A wall of radius 0.5 and height 1 about the y axis, open above and below, front outside."""
+    turn = 2 * np.pi * np.arange(sides) / sides
+    ring = np.stack([np.sin(turn) / 2, np.full(sides, -0.5), np.cos(turn) / 2], axis=1)
+    here, there = np.arange(sides), (np.arange(sides) + 1) % sides
+    faces = [np.stack([here, there, there + sides], 1), np.stack([here, there + sides, here + sides], 1)]
+    places = np.concatenate([ring, ring + np.array([0, 1, 0])])
+    return Geometry(places.astype(np.float32), np.concatenate(faces))
+
+
+def test_the_light_inside_a_shade_never_shows_on_its_outside(services, host):
+    lamp = PointLamp(id="lamp", name="lamp", intensity=10.0)
+    shade = MeshObject(id="s", name="s", geometry=tube(), materials=("m",))
+    scene = Scene().with_materials(Material(id="m", name="m")).with_nodes(CAMERA, lamp, shade)
+    outside = draw(scene, services, host, width=128, height=96, vertices=500)
+    assert (outside.node == 0).sum() > 1000
+    assert not outside.linear.any()
+    above = dataclasses.replace(CAMERA, transform=looking((0, 2, 1.0), (0, 0, 0)))
+    assert draw(scene.with_nodes(above), services, host).linear.any()
+
+
+def test_absurd_texture_coordinates_give_a_finite_picture(services, host):
+    texture = Texture(Image(np.linspace(0, 1, 64 * 64 * 3, dtype=np.float32).reshape(64, 64, 3)))
+    material = Material(id="m", name="m", textures={"base_color": texture})
+    for extent in (1e10, 1e19, 3e38):
+        plain = quad(size=3)
+        wild = Geometry(plain.positions, plain.faces, None, (plain.uvs - 0.5) * np.float32(extent))
+        node = MeshObject(id="q", name="q", geometry=wild, materials=("m",))
+        made = draw(Scene().with_materials(material).with_nodes(CAMERA, constant(), node), services, host)
+        assert np.isfinite(made.linear).all()
+        assert made.linear.max() < 2
+
+
 def test_texture_is_upright_and_not_mirrored(services, host):
     corners = np.zeros((2, 2, 3), np.float32)
     corners[0, 0], corners[0, 1], corners[1, 0] = (1, 0, 0), (0, 1, 0), (0, 0, 1)

@@ -64,14 +64,14 @@ def test_samples_are_ordered_by_pixel_and_lie_in_it():
 def _one_triangle():
     faces = np.array([[0, 1, 2]], np.uint32)
     back = np.array([[3, 4, 5]], np.uint32)
-    geometric = np.repeat(np.array([[0, 0, 1], [0, 0, -1]], np.float32), 3, axis=0)
+    places = np.tile(np.array([[0, 0, -1], [1, 0, -1], [0, 1, -1]], np.float32), (2, 1))
     uvs = np.tile(np.array([[0, 0], [1, 0], [0, 1]], np.float32), (2, 1))
     terms = np.arange(6 * 9, dtype=np.float32).reshape(6, 9)
-    return faces, back, geometric, np.zeros(6, np.int32), uvs, terms
+    return faces, back, places, np.zeros(6, np.int32), uvs, terms
 
 
 def _shade(direction, table, first, size, *, face=0):
-    faces, back, geometric, material, uvs, terms = _one_triangle()
+    faces, back, places, material, uvs, terms = _one_triangle()
     out = np.full((1, 3), -1, np.float32)
     shade_samples(
         0,
@@ -84,7 +84,7 @@ def _shade(direction, table, first, size, *, face=0):
         pinhole(View(looking((0, 0, 0), direction), fov=1e-3, width=1, height=1, antialias=1)),
         faces,
         back,
-        geometric,
+        places,
         material,
         uvs,
         np.ones(1, np.float32),

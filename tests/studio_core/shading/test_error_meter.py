@@ -101,6 +101,13 @@ def test_a_wrong_picture_is_seen_as_wrong(services, host, little_scene):
     assert meter.vertices.relative_rmse == pytest.approx(0.5, abs=0.1)
 
 
+def test_a_scene_without_light_has_no_error(services, host, little_scene):
+    bare = {k: v for k, v in little_scene().nodes.items() if k != "sky"}
+    meter, _, _, _ = measured(Scene(bare, little_scene().materials), services, host)
+    assert meter.picture.relative_rmse == meter.vertices.relative_rmse == 0
+    assert not meter.layers
+
+
 def test_an_empty_picture_has_no_error_to_measure(services, host, little_scene):
     scene = Scene()
     meter, _, _, _ = measured(scene, services, host)
