@@ -47,8 +47,26 @@ def resolve(material: Material, registry: Registry) -> Resolved:
                 values[name] = check(name, infos[name], value)
             except InputError as error:
                 problem = f"{material.name}: {error}"
-    textures = {name: t for name, t in material.textures.items() if name in brdf.textures}
+    textures: dict[str, Texture] = {}
+    for name, texture in material.textures.items():
+        if name not in brdf.textures:
+            continue
+        first = next(iter(textures.values()), texture)
+        if (texture.scale, texture.offset) == (first.scale, first.offset):
+            textures[name] = texture
+        else:
+            mean = linear_rgb(texture.image).mean(axis=(0, 1), dtype=np.float64)
+            values[name] = _times(values[name], mean)
+            problem = f"{material.name}: the textures of one material lie alike; {name} is shown as its mean"
     return Resolved(brdf, values, textures, problem)
+
+
+def _times(value: Value, colour: npt.NDArray[np.float64]) -> Value:
+    """A colour, or a number (by the first channel, as texels are read)."""
+    if isinstance(value, tuple):
+        red, green, blue = (float(v * c) for v, c in zip(value, colour, strict=True))
+        return (red, green, blue)
+    return float(value) * float(colour[0])
 
 
 def shapes(scene: Scene, materials: Sequence[MaterialId], registry: Registry) -> Shapes:
@@ -84,7 +102,8 @@ def coefficients(resolved: Resolved) -> npt.NDArray[np.float32]:
     values: dict[str, Any] = {
         name: np.asarray(v, np.float32) for name, v in resolved.values.items() if _numeric(v)
     }
-    size = max((t.image.pixels.shape[:2] for t in resolved.textures.values()), default=None)
+    sizes = [texture.image.pixels.shape[:2] for texture in resolved.textures.values()]
+    size = (max(h for h, _ in sizes), max(w for _, w in sizes)) if sizes else None
     for name, texture in resolved.textures.items():
         texels = linear_rgb(texture.image)[::-1]
         if size is not None and texels.shape[:2] != size:

@@ -74,6 +74,34 @@ def test_textures_of_different_sizes_and_scalars_meet(host):
     assert not made[:, 2:, 0].any()
 
 
+def test_a_texture_that_lies_otherwise_than_the_first_is_its_mean_and_said(host):
+    lines = np.array([[[0.0], [1.0]]], np.float32)
+    material = Material(
+        id="m",
+        name="Oak",
+        model="ggx",
+        values={"metallic": 0.8},
+        textures={
+            "base_color": Texture(Image(np.full((4, 4, 3), 0.5, np.float32)), scale=(2.0, 2.0)),
+            "metallic": Texture(Image(lines, "data")),
+        },
+    )
+    found = resolve(material, host)
+    assert set(found.textures) == {"base_color"}
+    assert found.values["metallic"] == pytest.approx(0.4)
+    assert "Oak" in found.problem
+    assert "metallic" in found.problem
+
+
+def test_maps_of_any_shape_keep_their_finest_rows_and_columns(host):
+    textures = {
+        "base_color": Texture(Image(np.ones((8, 2, 3), np.float32))),
+        "metallic": Texture(Image(np.ones((2, 16, 1), np.float32), "data")),
+    }
+    material = Material(id="m", name="m", model="ggx", textures=textures)
+    assert coefficients(resolve(material, host)).shape[:2] == (8, 16)
+
+
 @pytest.mark.parametrize("channels", [1, 3, 4])
 def test_srgb_bytes_become_linear_and_alpha_stays(channels):
     made = linear(Image(np.full((1, 1, channels), 188, np.uint8), "srgb"))
