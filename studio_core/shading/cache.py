@@ -10,7 +10,9 @@ import contextlib
 import hashlib
 import os
 import secrets
+import time
 import zipfile
+import zlib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -18,6 +20,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+_DAMAGED = (ValueError, KeyError, EOFError, RuntimeError, MemoryError, zipfile.BadZipFile, zlib.error)
+_ABANDONED_S = 3600.0  # no entry takes so long to write
 Arrays = Mapping[str, npt.NDArray[Any]]
 
 
@@ -35,7 +39,7 @@ class DiskCache:
             with path.open("rb") as file, np.load(file, allow_pickle=False) as found:
                 made = {name: found[name] for name in found.files}
             os.utime(path)
-        except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
+        except (*_DAMAGED, OSError):
             return None
         return made
 
@@ -58,6 +62,10 @@ class DiskCache:
         return self._folder / f"{hashlib.blake2b(text.encode(), digest_size=16).hexdigest()}.npz"
 
     def _shrink(self) -> None:
+        for part in self._folder.glob("*.part"):
+            with contextlib.suppress(OSError):
+                if time.time() - part.stat().st_mtime > _ABANDONED_S:
+                    part.unlink()
         entries = []
         for path in self._folder.glob("*.npz"):
             with contextlib.suppress(OSError):

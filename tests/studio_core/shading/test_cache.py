@@ -42,6 +42,30 @@ def test_damage_is_a_miss_and_can_be_replaced(tmp_path, damage):
     np.testing.assert_array_equal(cache.get("m")["a"], np.arange(3.0))
 
 
+def test_no_wrong_byte_is_worse_than_a_miss(tmp_path):
+    cache = DiskCache(tmp_path)
+    array = np.arange(4, dtype=np.float32)
+    cache.put({"a": array}, "m")
+    (entry,) = tmp_path.glob("*.npz")
+    content = entry.read_bytes()
+    for place in range(len(content)):
+        for wrong in (0, 9, 255, content[place] ^ 1):
+            entry.write_bytes(content[:place] + bytes([wrong]) + content[place + 1 :])
+            found = cache.get("m")
+            assert found is None or not found or np.array_equal(found["a"], array)
+
+
+def test_what_a_crash_left_half_written_goes_with_time(tmp_path):
+    cache = DiskCache(tmp_path)
+    old, new = tmp_path / "x.0.part", tmp_path / "y.0.part"
+    for part in (old, new):
+        part.write_bytes(b"half")
+    os.utime(old, (1e9, 1e9))
+    cache.put({"a": np.zeros(1)}, "m")
+    assert not old.exists()
+    assert new.exists()
+
+
 def test_pickles_are_not_read(tmp_path):
     cache = DiskCache(tmp_path)
     cache.put({"a": np.zeros(1)}, "m")
