@@ -72,6 +72,16 @@ class ComputeThread:
                 log.exception("work on the compute thread failed")
 
 
+def _attempt(work: Callable[[], Any]) -> tuple[Any, Exception | None]:
+    """What `work` gives, or its error."""
+    try:
+        return work(), None
+    except Exception as error:
+        return None, error
+    except SystemExit as error:  # a plugin must not take the program down
+        return None, RuntimeError(f"a stage tried to leave the program: {error}")
+
+
 class Scheduler:
     """Feeds one pipeline with frames.
 
@@ -160,56 +170,52 @@ class Scheduler:
         self._executor.submit(lambda: self._run(frame, changes, job))
 
     def _run(self, frame: Frame, changes: Changes, job: Job) -> None:
-        result: Any = None
-        error: Exception | None = None
-        try:
-            result = self.pipeline.update(frame, changes, job)
-        except Exception as caught:
-            error = caught
-        except SystemExit as caught:  # a plugin must not take the program down
-            error = RuntimeError(f"a stage tried to leave the program: {caught}")
+        result, error = _attempt(lambda: self.pipeline.update(frame, changes, job))
         self._post(lambda: self._finish(frame, job, result, error))
 
     def _finish(self, frame: Frame, job: Job, result: Any, error: Exception | None) -> None:
         self._job = None
-        done = False
-        if isinstance(error, Cancelled):
-            self.cancelled_jobs += 1
-        elif error is not None:
-            self.failed.emit(frame, error)
-        else:
-            done = True
-            self.finished_jobs += 1
-            self._show(frame, result, True)
+        try:
+            if isinstance(error, Cancelled):
+                self.cancelled_jobs += 1
+            elif error is not None:
+                self.failed.emit(frame, error)
+            else:
+                self.finished_jobs += 1
+                self._show(frame, result, True)
+        finally:  # a receiver that fails stops nothing
+            if error is None and self._waiting is None and self._job is None and not self._closed:
+                self._measure(frame)
+            else:
+                self._go_on()
+
+    def _go_on(self) -> None:
         if self._waiting is not None and not self._closed:
             self._start()
-        elif done and self._spare is not None and self._job is None and not self._closed:
-            self._measure(self._spare, frame)
         elif self._job is None:
             self.idle.emit()
 
-    def _measure(self, spare: Callable[[Pipeline, Frame, Job], Any], frame: Frame) -> None:
+    def _measure(self, frame: Frame) -> None:
+        spare = self._spare
+        if spare is None:
+            self._go_on()
+            return
         job = Job("Measuring the error", on_progress=lambda j: self._post(lambda: self.progress.emit(j)))
         self._job = self._spare_job = job
 
         def run() -> None:
-            result, error = None, None
-            try:
-                result = spare(self.pipeline, frame, job)
-            except Exception as caught:
-                error = caught
+            result, error = _attempt(lambda: spare(self.pipeline, frame, job))
             self._post(lambda: finish(result, error))
 
         def finish(result: Any, error: Exception | None) -> None:
             self._job = self._spare_job = None
-            if error is not None and not isinstance(error, Cancelled):
-                self.failed.emit(frame, error)
-            elif error is None and self._waiting is None and not self._closed:
-                self.measured.emit(frame, result)
-            if self._waiting is not None and not self._closed:
-                self._start()
-            elif self._job is None:
-                self.idle.emit()
+            try:
+                if error is not None and not isinstance(error, Cancelled):
+                    self.failed.emit(frame, error)
+                elif error is None and self._waiting is None and not self._closed:
+                    self.measured.emit(frame, result)
+            finally:
+                self._go_on()
 
         self._executor.submit(run)
 

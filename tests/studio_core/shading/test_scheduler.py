@@ -28,6 +28,7 @@ from studio_core.scene.nodes import Scene
 from studio_core.scene.transform import Transform
 from studio_core.session import View
 from studio_core.shading.frame import Frame
+from studio_core.shading.job import Job
 from studio_core.shading.pipeline import Pipeline
 from studio_core.shading.scheduler import ComputeThread, InlineExecutor, Scheduler
 
@@ -240,6 +241,44 @@ def test_a_failure_does_not_stop_what_waits(bench: Bench) -> None:
 
 
 # ---------------------------------------------------------------- order of results
+
+
+@pytest.mark.parametrize("error", [ValueError("bad"), SystemExit(3)])
+def test_whatever_the_spare_work_does_the_next_request_runs(error: BaseException) -> None:
+    bench = Bench()
+    failing = [error]
+
+    def spare(pipeline: Pipeline, frame: Frame, job: Job) -> str:
+        if failing:
+            raise failing.pop()
+        return "measured"
+
+    scheduler = Scheduler(Pipeline(bench.stages), bench.executor, spare=spare)
+    failures: list[Exception] = []
+    measured: list[object] = []
+    scheduler.failed.connect(lambda _, error: failures.append(error))
+    scheduler.measured.connect(lambda _, result: measured.append(result))
+    for _ in range(2):
+        scheduler.request(Frame(bench.scene, bench.view, None), Changes())
+        bench.executor.drain()
+    assert len(failures) == 1
+    assert measured == ["measured"]
+    assert not scheduler.busy
+
+
+def test_a_receiver_that_fails_does_not_stop_what_waits(bench: Bench) -> None:
+    def fails(*_: object) -> None:
+        raise ZeroDivisionError("a bug in a panel")
+
+    off = bench.scheduler.shown.connect(fails)
+    bench.once(PICTURE, lambda: bench.edit(tint(0.7)))
+    bench.edit(tint(0.5))
+    with pytest.raises(ZeroDivisionError):
+        bench.executor.drain()
+    off()
+    bench.executor.drain()
+    assert not bench.scheduler.busy
+    assert bench.shown[-1][1:] == (bench.truth(), True)
 
 
 def test_stale_results_are_dropped() -> None:
