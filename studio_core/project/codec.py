@@ -10,7 +10,6 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
 import numpy.typing as npt
 
 from studio_core.errors import ProjectError
@@ -59,13 +58,6 @@ class Blob:
 
 def _geometry_refs(geometry: Geometry) -> dict[str, ArrayRef]:
     return {name: array_ref(array) for name, array in geometry.parts()}
-
-
-def _image_ref(image: Image) -> ArrayRef:
-    for row in image.pixels if image.pixels.dtype == np.float32 else ():
-        if not np.isfinite(row).all():
-            raise ProjectError("the picture has pixels that are not finite numbers")
-    return array_ref(image.pixels)
 
 
 class _Outward:
@@ -132,12 +124,11 @@ class Inward:
         if key not in self._images:
             if ref.shape[2] not in (1, 3, 4) or 0 in ref.shape:
                 raise ProjectError(f"{part} is damaged: a picture of shape {ref.shape}")
-            made = Image(self._fetch(ref, part, True), encoding)
+            pixels = self._fetch(ref, part, True)
             try:
-                image_ref(made)
-            except ProjectError as error:
-                raise ProjectError(f"{part}: {error}") from None
-            self._images[key] = made
+                self._images[key] = Image(pixels, encoding)
+            except ValueError as error:
+                raise ProjectError(f"{part} is damaged: {error}") from None
         return self._images[key]
 
     def item(self, value: dict[str, Any], part: str) -> Node | Material:
@@ -209,6 +200,6 @@ def scene_digest(scene: Scene) -> str:
 
 # What follows remembers pure results for as long as the values live; nothing else is shared.
 geometry_refs: Memo[dict[str, ArrayRef]] = Memo(_geometry_refs)
-image_ref: Memo[ArrayRef] = Memo(_image_ref)
+image_ref: Memo[ArrayRef] = Memo(lambda image: array_ref(image.pixels))
 item_hash: Memo[str] = Memo(lambda item: text_hash(encode_item(item)[0]))
 known_digest: Memo[str] = Memo(lambda scene: scene_form(scene).digest)

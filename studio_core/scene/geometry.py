@@ -82,6 +82,7 @@ class Image:
     """A picture: (H, W, C) float32 or uint8, rows from the top, C 1, 3 or 4.
 
     `encoding` says what the numbers are: scene-linear Rec.709, sRGB-encoded, or plain data (normals).
+    Raises ValueError when the shape does not fit or a pixel is not finite.
     """
 
     pixels: npt.NDArray[Any]
@@ -92,6 +93,8 @@ class Image:
         made = readonly(self.pixels, dtype, -1, -1, -1)
         if made.shape[2] not in (1, 3, 4) or 0 in made.shape:
             raise ValueError(f"a picture of shape {made.shape} cannot be used")
+        if not (np.isfinite(made.min()) and np.isfinite(made.max())):
+            raise ValueError("a picture must have finite pixels")
         object.__setattr__(self, "pixels", made)
 
     @cached_property

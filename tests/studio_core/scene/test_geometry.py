@@ -76,3 +76,11 @@ def test_pictures_are_bytes_or_floats(channels: int, dtype: type) -> None:
 def test_pictures_of_other_shapes_are_refused(shape: tuple[int, ...]) -> None:
     with pytest.raises(ValueError, match="shape"):
         Image(np.zeros(shape, np.float32))
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
+def test_a_picture_is_finite(bad: float) -> None:
+    pixels = np.ones((3, 4, 3), np.float32)
+    pixels[1, 2, 0] = bad
+    with pytest.raises(ValueError, match="finite"):
+        Image(pixels)
