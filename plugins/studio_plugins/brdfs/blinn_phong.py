@@ -29,21 +29,15 @@ import numpy.typing as npt
 
 from studio_core.jit import batch_function
 from studio_core.kernels.brdf import HALF, LEAST_HEIGHT, ONE, SIGNATURE, ZERO, carray, power_of_complement
-from studio_core.params import Colour, Value, param
+from studio_core.params import Value
+from studio_plugins.brdfs.two_lobes import TwoLobeParams, TwoLobes, exponent, sharpness
 
 
 @dataclass(frozen=True)
-class Params:
+class Params(TwoLobeParams):
     """Parameters of `BlinnPhong`."""
 
-    diffuse: Colour = param((0.6, 0.6, 0.6), "Matte colour", "Albedo of the matte part", low=0.0, high=1.0)
-    specular: Colour = param(
-        (0.1, 0.1, 0.1), "Highlight colour", "Albedo of the highlight seen head-on", low=0.0, high=1.0
-    )
-    exponent: float = param(
-        200.0, "Sharpness", "Exponent of the highlight; higher is smaller and brighter",
-        low=1.0, high=1e5, scale="log",
-    )  # fmt: skip
+    exponent: float = sharpness(200.0)
 
 
 @batch_function(SIGNATURE)
@@ -66,14 +60,12 @@ def evaluate(shape: Any, wo: Any, count: int, wi: Any, out: Any) -> None:
         b1[k] = lit * peak * power_of_complement(flat / whole, height / whole, half_n)  # sin² of h, cos²
 
 
-class BlinnPhong:
+class BlinnPhong(TwoLobes):
     """See the module; satisfies `studio_core.contract.Brdf`."""
 
     id = "blinn-phong"
     label = "Blinn–Phong"
     Params = Params
-    terms = 2
-    textures: tuple[str, ...] = ("diffuse", "specular")
 
     @property
     def address(self) -> int:
@@ -82,15 +74,8 @@ class BlinnPhong:
 
     def shape(self, values: Mapping[str, Value]) -> npt.NDArray[np.float32]:
         """(2,): exponent and the lobe's peak."""
-        n = float(np.clip(values["exponent"], 1.0, 1e5))
+        n = exponent(values)
         return np.array([n, (n + 2) * (n + 4) / (8 * np.pi * (2 ** (-n / 2) + n))], np.float32)
-
-    def coefficients(self, values: Mapping[str, npt.NDArray[np.floating[Any]]]) -> npt.NDArray[np.float32]:
-        """(..., 2, 3): diffuse / π and specular after the energy rule of the module."""
-        diffuse = np.clip(np.asarray(values["diffuse"], np.float32), 0, 1)
-        specular = np.clip(np.asarray(values["specular"], np.float32), 0, 1)
-        excess = np.maximum(diffuse + specular, np.float32(1))
-        return np.stack(np.broadcast_arrays(diffuse / excess / np.float32(np.pi), specular / excess), axis=-2)
 
 
 MODEL = BlinnPhong()
