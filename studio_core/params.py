@@ -104,6 +104,17 @@ def _number(info: ParamInfo, value: Any) -> float:
     return number
 
 
+def nearest(info: ParamInfo, value: Any) -> Any:
+    """The value of the parameter's own type that is in its range and nearest to `value`."""
+    match info.kind:
+        case "number" | "integer":
+            return min(max(value, info.low), info.high)
+        case "colour":
+            return tuple(min(max(v, info.low), info.high) for v in value)
+        case _:
+            return value
+
+
 def parse(name: str, info: ParamInfo, text: str) -> Value:
     """A value from the command line's text (`0.5`, `true`, `0.8/0.2/0.1` or `#c83214` for colours)."""
     match info.kind:

@@ -16,7 +16,7 @@ import numpy as np
 
 from studio_core.arrays import frozen_map
 from studio_core.errors import ProjectError
-from studio_core.params import Value
+from studio_core.params import Value, nearest, param_infos
 from studio_core.scene.geometry import Geometry, Image
 
 Dataclass = TypeVar("Dataclass")
@@ -176,7 +176,8 @@ class Record:
     """The codec of a dataclass: every field by name, nothing else.
 
     A missing field takes its default (files of this format from before the field was added); an unknown
-    one is refused, for leaving it out would lose what a newer program saved.
+    one is refused, for leaving it out would lose what a newer program saved. A number out of its
+    parameter's range is brought into it: the project opens, and kernels get what they are made for.
     """
 
     def __init__(self, cls: type[Any]) -> None:
@@ -184,6 +185,7 @@ class Record:
         self.cls = cls
         self.fields = {f.name: codec_for(hints[f.name]) for f in dataclasses.fields(cls)}
         missing = dataclasses.MISSING
+        self.ranges = param_infos(cls)
         self.needed = {
             f.name for f in dataclasses.fields(cls) if f.default is missing and f.default_factory is missing
         }
@@ -208,6 +210,7 @@ class Record:
             if name not in value:
                 raise ProjectError(f"{part} lacks the field {name!r}")
         made = {name: self.fields[name].read(v, heavy, f"{part} ▸ {name}") for name, v in value.items()}
+        made |= {name: nearest(info, made[name]) for name, info in self.ranges.items() if name in made}
         try:
             return self.cls(**made)
         except (ValueError, TypeError) as error:

@@ -97,7 +97,11 @@ def scenes(draw: st.DrawFn) -> Scene:
             "hidden": draw(st.booleans()),
             "locked": draw(st.booleans()),
         }
-        lit = {"intensity": draw(FLOATS), "tint": draw(TRIPLES), "temperature": draw(FLOATS)}
+        lit = {
+            "intensity": draw(st.floats(0, 1e9)),
+            "tint": draw(st.tuples(*[st.floats(0, 1e3)] * 3)),
+            "temperature": draw(st.floats(0, 25000)),
+        }
         made.append(
             draw(
                 st.sampled_from(
@@ -108,7 +112,7 @@ def scenes(draw: st.DrawFn) -> Scene:
                             geometry=draw(st.sampled_from(meshes)),
                             materials=tuple(draw(st.permutations([p.id for p in paints]))[:3]),
                         ),
-                        Camera(**base, fov=draw(FLOATS)),
+                        Camera(**base, fov=draw(st.floats(1, 170))),
                         Environment(
                             **base,
                             **lit,
@@ -118,7 +122,7 @@ def scenes(draw: st.DrawFn) -> Scene:
                         PointLamp(**base, **lit),
                         SpotLamp(**base, **lit),
                         DirectionalLamp(**base, **lit),
-                        AreaLamp(**base, **lit, width=draw(FLOATS)),
+                        AreaLamp(**base, **lit, width=draw(st.floats(1e-3, 1e3))),
                     ]
                 )
             )

@@ -11,7 +11,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from studio_core.errors import InputError
-from studio_core.params import ParamInfo, build, check, defaults, param, param_infos, parse, parse_colour
+from studio_core.params import (
+    ParamInfo,
+    build,
+    check,
+    defaults,
+    nearest,
+    param,
+    param_infos,
+    parse,
+    parse_colour,
+)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -138,3 +148,13 @@ def test_building_checks_every_name_and_value() -> None:
 
 def test_metadata_reaches_forms() -> None:
     assert INFOS["gloss"] == ParamInfo("number", "Gloss", "How shiny", unit="%", low=0.0, high=1.0)
+
+
+@given(st.floats(allow_nan=False), st.floats(-10, 10), st.floats(0, 10))
+def test_the_nearest_value_fits(value: float, low: float, width: float) -> None:
+    info = ParamInfo("number", "x", low=low, high=low + width)
+    made = nearest(info, value)
+    assert check("x", info, made) == made
+    assert made == value or not low <= value <= low + width
+    colour = ParamInfo("colour", "x", low=low, high=low + width)
+    assert nearest(colour, (value, low, value)) == (made, low, made)

@@ -22,7 +22,17 @@ from studio_core.project.canonical import dumps, loads, text_hash
 from studio_core.project.memo import Memo
 from studio_core.project.validate import check_scene
 from studio_core.scene.geometry import Geometry, Image, Texture
-from studio_core.scene.nodes import Camera, Environment, Group, Material, MeshObject, Node, PointLamp, Scene
+from studio_core.scene.nodes import (
+    Camera,
+    Environment,
+    Group,
+    Material,
+    MeshObject,
+    Node,
+    PointLamp,
+    Scene,
+    SpotLamp,
+)
 from studio_core.scene.transform import Transform
 
 SLOW = settings(max_examples=60, deadline=None, suppress_health_check=list(HealthCheck))
@@ -70,6 +80,17 @@ def test_items_come_back_bit_for_bit(scene: Scene) -> None:
         if isinstance(before, Environment):
             assert before.image.pixels.tobytes() == after.image.pixels.tobytes()
             assert before.image.encoding == after.image.encoding
+
+
+@pytest.mark.parametrize(("written", "read"), [(1e308, 170.0), (-1e308, 1.0), (0.0, 1.0), (45.5, 45.5)])
+def test_numbers_out_of_range_are_brought_into_it(written: float, read: float) -> None:
+    (camera,) = back(Camera(id="c", name="Eye", fov=written))
+    assert camera.fov == read
+    (lamp,) = back(SpotLamp(id="l", name="Spot", intensity=-1.0, tint=(2e3, 1.0, -3.0), cone=1e9))
+    assert (lamp.intensity, lamp.tint, lamp.cone) == (0.0, (1e3, 1.0, 0.0), 90.0)
+    (glass,) = back(Material(id="m", name="Glass", opacity=-7.0, values=frozen_map({"base_color": 1e9})))
+    assert glass.opacity == 0.0
+    assert glass.values["base_color"] == 1e9  # checked where the model is known
 
 
 def test_equal_meshes_and_pictures_become_one_object() -> None:
