@@ -1,0 +1,138 @@
+"""What shading kernels promise of any input: finite, never negative, and no larger than the light allows."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from studio_core.kernels.compose import background_samples, shade_samples
+from studio_core.kernels.directions import direction_set
+from studio_core.kernels.radiance import environment_terms, lamp_terms
+from studio_core.params import defaults
+from studio_core.scene.transform import looking
+from studio_core.session import View
+from studio_core.shading.artifacts import TERMS
+from studio_core.shading.stages import pinhole
+
+QUICK = settings(max_examples=60)
+DIRECTIONS = direction_set(10)
+MODELS = st.sampled_from(
+    [
+        ("lambert", {}),
+        *[("ggx", {"roughness": r}) for r in (0.0, 1e-6, 0.01, 0.3, 1.0)],
+        *[("phong", {"exponent": n}) for n in (1.0, 100.0, 1e5)],
+        *[("blinn-phong", {"exponent": n}) for n in (1.0, 100.0, 1e5)],
+    ]
+)
+RADIANCE = st.floats(-4, 6).map(lambda power: 10.0**power)
+# Along the axes, within a float of grazing, and anything between.
+NORMALS = st.one_of(
+    st.sampled_from([(0, 0, 1), (0, 0, -1), (1, 0, 0), (0, -1, 0), (1, 0, -0.0), (0, 0, 0)]),
+    st.tuples(*[st.floats(-1, 1)] * 3),
+)
+TILTS = st.sampled_from([0.0, 1e-38, 1e-12, 1e-7, 1e-4, 0.1, 1.0, -1e-7, -1.0])
+PLACES = st.one_of(st.just(0.0), st.floats(-1e4, 1e4))
+
+
+def unit(vector):
+    length = math.hypot(*vector)
+    return np.array(vector if length < 1e-30 else [c / length for c in vector], np.float32)
+
+
+def grazing(normal, tilt):
+    """A unit direction whose cosine with the normal is about `tilt`."""
+    aside = np.cross(normal, (0.3, 0.8, -0.5) if abs(normal[0]) > 0.5 else (1.0, 0.0, 0.0))
+    return unit(unit(aside).astype(np.float64) + tilt * normal)
+
+
+def tables(host, model):
+    name, values = model
+    brdf = host.brdf(name)
+    shape = np.atleast_1d(brdf.shape(defaults(brdf.Params) | values)).astype(np.float32)
+    address, terms = np.array([brdf.address], np.int64), np.array([brdf.terms], np.int64)
+    return address, terms, np.zeros(1, np.int64), np.concatenate([shape, [0]]).astype(np.float32)
+
+
+@given(MODELS, NORMALS, TILTS, RADIANCE, st.tuples(PLACES, PLACES, PLACES), st.booleans())
+@QUICK
+def test_environment_sums(host, model, normal, tilt, level, place, at_the_eye):
+    n, position = unit(normal), np.array([place], np.float32)
+    eye = position[0] if at_the_eye else (position[0] + 3 * grazing(n, tilt)).astype(np.float32)
+    made = []
+    for light in (level, 1.0):
+        out, irradiance = np.zeros((1, TERMS, 3), np.float32), np.zeros((1, 3), np.float32)
+        bits = np.full((1, DIRECTIONS.size // 64), np.uint64(0xFFFFFFFFFFFFFFFF))
+        leaves = np.full((DIRECTIONS.size, 3), light, np.float32)
+        where = (np.zeros(1, np.int64), position, n[None], np.zeros(1, np.int32), eye, bits)
+        sums = (DIRECTIONS.directions, leaves, DIRECTIONS.solid_angle, *tables(host, model))
+        environment_terms(0, 1, *where, *sums, out, irradiance)
+        made.append((out, irradiance))
+    (out, irradiance), (unit_out, _) = made
+    assert np.isfinite(out).all()
+    assert (out >= 0).all()
+    assert (irradiance <= 1.05 * np.pi * level).all()
+    np.testing.assert_allclose(out, unit_out * level, rtol=1e-3, atol=1e-30)
+
+
+@given(MODELS, NORMALS, TILTS, TILTS, st.floats(-4, 12), st.tuples(PLACES, PLACES, PLACES))
+@QUICK
+def test_lamp_sums(host, model, normal, tilt, towards_tilt, power, place):
+    n, position, weight = unit(normal), np.array([place], np.float32), np.float32(10.0**power)
+    eye = (position[0] + grazing(n, tilt)).astype(np.float32)
+    towards = grazing(n, towards_tilt)[None, None]
+    out, irradiance = np.zeros((1, TERMS, 3), np.float32), np.zeros((1, 3), np.float32)
+    where = (np.zeros(1, np.int64), position, n[None], np.zeros(1, np.int32), eye)
+    light = (towards, np.full((1, 1), weight), np.ones((1, 1), np.bool_))
+    lamp_terms(*where, *light, *tables(host, model), out, irradiance)
+    assert np.isfinite(out).all()
+    assert (out >= 0).all()
+    assert (irradiance <= 1.0001 * weight).all()
+    if towards_tilt < -1e-6:
+        assert not out.any()
+
+
+COORDINATES = st.one_of(
+    st.sampled_from([0.0, 1.0, 1e-30, -1e-30, 1e4, 3e38, -3e38]), st.floats(-1e5, 1e5, width=32)
+)
+TRIANGLES = st.lists(st.tuples(COORDINATES, COORDINATES, COORDINATES), min_size=3, max_size=3)
+UVS = st.lists(st.tuples(COORDINATES, COORDINATES), min_size=3, max_size=3)
+PIXELS = np.random.default_rng(0).random((9, 9)).astype(np.float32)
+
+
+@given(TRIANGLES, UVS, RADIANCE, st.floats(0, 1e30), st.sampled_from([0.0, 1e-6, 1.0, 1e30]))
+@QUICK
+def test_samples_of_any_triangle(corners, uvs, level, distance, texels):
+    faces = np.array([[0, 1, 2]], np.uint32)
+    first, size = np.array([[0, 4, 0, 0]]), np.array([[[2, 2], [1, 1], [0, 0], [0, 0]]])
+    table = np.concatenate([PIXELS[:4], PIXELS[4:5]])
+    terms = np.full((3, 9), level, np.float32)
+    out = np.zeros((1, 3), np.float32)
+    hit = (np.zeros(1, np.int32), *np.array([[0.2], [0.3]], np.float32), np.array([distance], np.float32))
+    lens = pinhole(View(looking((0, 0, 0), (0.1, -0.3, -1)), width=1, height=1, antialias=1))
+    mesh = (faces, faces, np.array(corners, np.float32), np.zeros(3, np.int32), np.array(uvs, np.float32))
+    coefficients = (table, first, size, np.array([[1, 1, 0, 0]], np.float32))
+    shade_samples(
+        0, 1, *hit, np.zeros(0, np.int64), lens, *mesh, np.array([texels], np.float32), terms, *coefficients,
+        0.01, out,
+    )  # fmt: skip
+    assert np.isfinite(out).all()
+    assert (out >= 0).all()
+    assert (out <= 3.001 * level * PIXELS.max()).all()
+
+
+@given(RADIANCE, st.floats(0.01, 179.9), st.tuples(*[st.floats(-1, 1)] * 3), st.integers(1, 4))
+@QUICK
+def test_background_of_any_view(level, fov, target, rows):
+    aim = unit(target) if any(abs(c) > 1e-6 for c in target) else np.array([0, 1, 0], np.float32)
+    view = View(looking((0, 0, 0), aim), fov=fov, width=5, height=5, antialias=1)
+    pixels = (level * np.random.default_rng(rows).random((rows, 2 * rows, 3))).astype(np.float32)
+    out = np.full((25, 3), -1, np.float32)
+    nothing = np.full(25, -1, np.int32)
+    turn, gain = np.eye(3, dtype=np.float32), np.ones(3, np.float32)
+    background_samples(0, 25, nothing, np.zeros(0, np.int64), pinhole(view), turn, pixels, gain, out)
+    assert np.isfinite(out).all()
+    assert (out >= 0).all()
+    assert (out <= 1.0001 * pixels.max()).all()
