@@ -26,8 +26,8 @@ from studio_core.scene.nodes import (
 class Aspect(Flag):
     """What kind of thing changed; stages name what dirties them.
 
-    GAIN is the part of LIGHT that is linear (intensity, tint, temperature): a weighted sum, no new light
-    sum. NAME covers what no picture shows.
+    GAIN is the part of LIGHT that is linear (intensity, tint, temperature; whether it is seen): a weighted
+    sum, no new light sum. NAME covers what no picture shows.
     """
 
     NONE = 0
@@ -44,7 +44,7 @@ class Aspect(Flag):
 
 
 EVERYTHING = ~Aspect.NONE
-_GAIN_FIELDS = ("intensity", "tint", "temperature")
+_GAIN_FIELDS = ("intensity", "tint", "temperature", "background")
 _NAME_FIELDS = ("name", "locked")
 
 
@@ -163,8 +163,6 @@ def _node_diff(old: Node, new: Node) -> Aspect:
         elif isinstance(new, Light):
             if name in _GAIN_FIELDS:
                 aspect |= Aspect.GAIN
-            elif name == "background":
-                aspect |= Aspect.VIEW
             elif isinstance(new, Environment) and name == "luminance_scale":
                 aspect |= Aspect.NAME
             else:

@@ -85,7 +85,7 @@ def must_be_named(before: Scene, after: Scene, node: NodeId) -> Aspect:
         if old.image is not new.image or (old.azimuth, old.tilt) != (new.azimuth, new.tilt):
             must |= Aspect.LIGHT
         if old.background != new.background:
-            must |= Aspect.VIEW
+            must |= Aspect.GAIN
     if isinstance(old, AreaLamp) and isinstance(new, AreaLamp) and old.width != new.width:
         must |= Aspect.LIGHT
     if isinstance(old, SpotLamp) and isinstance(new, SpotLamp) and old.cone != new.cone:
@@ -205,7 +205,7 @@ LIT = Aspect.LIGHT | Aspect.GAIN
         (edits.SetFields("sky", {"temperature": 3000}), {"sky": Aspect.GAIN}),
         (edits.SetFields("sky", {"azimuth": 30}), {"sky": Aspect.LIGHT}),
         (edits.SetFields("sky", {"image": sky(8)}), {"sky": Aspect.LIGHT}),
-        (edits.SetFields("sky", {"background": False}), {"sky": Aspect.VIEW}),
+        (edits.SetFields("sky", {"background": False}), {"sky": Aspect.GAIN}),
         (edits.SetFields("cube", {"name": "Box"}), {"cube": Aspect.NAME}),
         (edits.SetFields("camera", {"fov": 20}), {"camera": Aspect.NAME}),
         (edits.SetGeometry("cube", cube(2)), {"cube": Aspect.GEOMETRY}),

@@ -26,7 +26,7 @@ from studio_core.scene.nodes import (
 )
 from studio_core.scene.transform import Transform
 from studio_core.session import View
-from studio_core.shading.artifacts import Picture
+from studio_core.shading.artifacts import Picture, Radiance
 from studio_core.shading.brute_force import VisibilityBits
 from studio_core.shading.frame import Frame
 from studio_core.shading.job import Job
@@ -119,6 +119,13 @@ def test_what_moves_no_surface_traces_no_environment_ray(watched):
     assert watched.traced == traced
     watched.apply(edits.Move({"cube": Transform((0.2, 0.5, 0.0))}))
     assert watched.traced[0] is not traced[0]
+
+
+def test_whether_the_environment_is_seen_costs_no_light_sum(watched):
+    radiance = watched.pipeline.artifact(Radiance)
+    watched.apply(edits.SetFields("sky", {"background": False}))
+    watched.apply(edits.SetFields("sky", {"intensity": 2.0}))
+    assert watched.pipeline.artifact(Radiance) is radiance
 
 
 def test_groups_move_hide_and_hang_elsewhere(watched):
