@@ -80,9 +80,9 @@ def load_environment(
 
 def _linear(path: Path, decoder: ImageDecoder) -> tuple[npt.NDArray[np.float32], Facts]:
     """(H, W, 3) linear, alpha left out."""
-    image, facts = decoder.read_with_facts(path)
-    colour = image.pixels[:, :, [0, 0, 0]] if image.pixels.shape[2] == 1 else image.pixels[:, :, :3]
-    return (srgb_to_linear(colour) if image.encoding == "srgb" else colour), facts
+    pixels, facts = decoder.read_pixels(path)
+    colour = pixels[:, :, [0, 0, 0]] if pixels.shape[2] == 1 else pixels[:, :, :3]
+    return (srgb_to_linear(colour) if facts.encoding == "srgb" else colour), facts
 
 
 def _equirect(

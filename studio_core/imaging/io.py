@@ -74,11 +74,11 @@ class ImageDecoder:
         self.close()
 
     def read(self, path: str | os.PathLike[str]) -> Image:
-        """The picture in a file; InputError naming the file when it cannot be read."""
-        return self.read_with_facts(path)[0]
+        """The picture in a file, made finite; InputError naming the file when it cannot be read."""
+        return _finite(*self.read_pixels(path))
 
-    def read_with_facts(self, path: str | os.PathLike[str]) -> tuple[Image, Facts]:
-        """The picture, and what its file says about it."""
+    def read_pixels(self, path: str | os.PathLike[str]) -> tuple[npt.NDArray[Any], Facts]:
+        """The pixels as the file holds them, NaN and Inf included, and what it says about them."""
         path = Path(path)
         name = str(path)
         try:
@@ -106,18 +106,18 @@ class ImageDecoder:
             return self._ask(str(copy), name)
 
     def decode(self, data: bytes, name: str) -> Image:
-        """The picture in the bytes of a file; `name` is what messages call it."""
+        """The picture in the bytes of a file, made finite; `name` is what messages call it."""
         suffix = _suffix(data[:HEADER], Path(name).suffix.lower()[:8] if "\0" not in name else "")
         if suffix is None:
             raise InputError(f"{name} cannot be read: it is no picture of a known format")
-        return self._ask_bytes(data, suffix, name)[0]
+        return _finite(*self._ask_bytes(data, suffix, name))
 
     def close(self) -> None:
         """End the child; a later read starts a new one."""
         with self._lock:
             self._stop()
 
-    def _ask_bytes(self, data: bytes, suffix: str, name: str) -> tuple[Image, Facts]:
+    def _ask_bytes(self, data: bytes, suffix: str, name: str) -> tuple[npt.NDArray[Any], Facts]:
         if suffix == ".hdr" and not parse_header(data).format:
             data = with_format(data)
         with tempfile.TemporaryDirectory(prefix="lucarne-") as folder:
@@ -125,7 +125,7 @@ class ImageDecoder:
             copy.write_bytes(data)
             return self._ask(str(copy), name)
 
-    def _ask(self, path: str, name: str) -> tuple[Image, Facts]:
+    def _ask(self, path: str, name: str) -> tuple[npt.NDArray[Any], Facts]:
         with self._lock:
             child = self._start()
             late = threading.Event()
@@ -155,7 +155,7 @@ class ImageDecoder:
             raise InputError(f"{name} cannot be read: {answer['error']}")
         facts = Facts(**answer["facts"])
         pixels.flags.writeable = False
-        return Image(pixels, facts.encoding), facts
+        return pixels, facts
 
     def _exchange(
         self, child: subprocess.Popen[bytes], path: str
@@ -210,13 +210,22 @@ class ImageDecoder:
         child.wait()
 
 
+def _finite(pixels: npt.NDArray[Any], facts: Facts) -> Image:
+    """The picture with 0 for NaN and -Inf, and the brightest other number for Inf."""
+    if pixels.dtype == np.float32 and not (np.isfinite(pixels.min()) and np.isfinite(pixels.max())):
+        brightest = pixels.max(initial=0.0, where=np.isfinite(pixels))
+        pixels = np.nan_to_num(pixels, nan=0.0, posinf=brightest, neginf=0.0)
+    return Image(pixels, facts.encoding)
+
+
 def read_image(
     source: str | os.PathLike[str] | bytes, name: str = "", decoder: ImageDecoder | None = None
 ) -> Image:
     """A picture from a file, or from a file's bytes that messages call `name`.
 
     OpenEXR, Radiance and floating-point TIFF give linear float32 Rec.709; 8 bits stay sRGB-encoded
-    uint8; 16 bits are decoded to linear float32. (H, W, C): grey 1, colour 3, with alpha 4.
+    uint8; 16 bits are decoded to linear float32. (H, W, C): grey 1, colour 3, with alpha 4. NaN becomes 0,
+    Inf the brightest other number.
     Without a `decoder` one is started for this picture alone. Raises InputError.
     """
     if decoder is None:

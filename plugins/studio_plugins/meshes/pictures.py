@@ -49,17 +49,11 @@ class Pictures:
             if self._decoder is None:
                 self._decoder = ImageDecoder()
             try:
-                self._found[key] = _finite(read(self._decoder))
+                self._found[key] = read(self._decoder)
             except InputError as error:
                 self._found[key] = None
                 self.notes.say(f"{error}.")
         return self._found[key]
-
-
-def _finite(image: Image) -> Image:
-    if image.pixels.dtype == np.uint8 or np.isfinite(image.pixels).all():
-        return image
-    return replace(image, pixels=np.nan_to_num(image.pixels, nan=0.0, posinf=1.0, neginf=0.0))
 
 
 def opaque(image: Image) -> Image:

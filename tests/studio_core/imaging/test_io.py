@@ -29,12 +29,25 @@ def picture(channels: int, height: int = 5, width: int = 7) -> np.ndarray:
 
 
 @pytest.mark.parametrize("channels", [1, 3, 4])
-def test_exr_comes_back_bit_for_bit(decoder: ImageDecoder, channels: int) -> None:
+def test_exr_comes_back_bit_for_bit(decoder: ImageDecoder, channels: int, tmp_path: Path) -> None:
     pixels = picture(channels) * 1e5
-    pixels[0, 0], pixels[0, 1], pixels[0, 2] = np.nan, np.inf, -1e-30
+    pixels[0, 2] = -1e-30
     read = read_image(encode_exr(pixels), "memory.exr", decoder)
     assert read.encoding == "linear"
     np.testing.assert_array_equal(read.pixels.view(np.uint32), pixels.view(np.uint32))
+    pixels[0, 0], pixels[0, 1] = np.nan, np.inf
+    (tmp_path / "wild.exr").write_bytes(encode_exr(pixels))
+    found, _ = decoder.read_pixels(tmp_path / "wild.exr")
+    np.testing.assert_array_equal(found.view(np.uint32), pixels.view(np.uint32))
+
+
+def test_what_is_no_number_in_a_file_is_one_in_its_picture(decoder: ImageDecoder) -> None:
+    pixels = picture(3)
+    pixels[0, :3] = np.array([np.nan, np.inf, -np.inf])[:, None]
+    found = read_image(encode_exr(pixels), "memory.exr", decoder).pixels
+    brightest = pixels[np.isfinite(pixels)].max()
+    np.testing.assert_array_equal(found[0, :3, 0], [0, brightest, 0])
+    np.testing.assert_array_equal(found[1:], pixels[1:])
 
 
 @pytest.mark.parametrize("channels", [1, 3, 4])
@@ -106,8 +119,8 @@ def test_the_first_part_with_colour_is_read(decoder: ImageDecoder, tmp_path: Pat
     assert output.open(str(tmp_path / "parts.exr"), specs[1], "AppendSubimage")
     assert output.write_image(colour)
     assert output.close()
-    image, facts = decoder.read_with_facts(tmp_path / "parts.exr")
-    np.testing.assert_array_equal(image.pixels, colour)
+    found, facts = decoder.read_pixels(tmp_path / "parts.exr")
+    np.testing.assert_array_equal(found, colour)
     assert "Part 2" in facts.notes[0]
 
 
@@ -122,10 +135,10 @@ def test_a_data_window_is_put_into_its_display_window(decoder: ImageDecoder, tmp
     assert output.open(str(tmp_path / "window.exr"), spec)
     assert output.write_image(pixels)
     assert output.close()
-    image, facts = decoder.read_with_facts(tmp_path / "window.exr")
-    assert image.pixels.shape == (8, 5, 3)
-    np.testing.assert_array_equal(image.pixels[1:5, :4], pixels[:, 2:])
-    assert image.pixels[0].sum() == image.pixels[5:].sum() == image.pixels[:, 4].sum() == 0
+    found, facts = decoder.read_pixels(tmp_path / "window.exr")
+    assert found.shape == (8, 5, 3)
+    np.testing.assert_array_equal(found[1:5, :4], pixels[:, 2:])
+    assert found[0].sum() == found[5:].sum() == found[:, 4].sum() == 0
     assert "display window" in facts.notes[0]
 
 
@@ -133,8 +146,8 @@ def test_radiance_headers_without_format_and_with_exposure(decoder: ImageDecoder
     rgbe = bytes((128, 64, 32, 129)) * 8
     head = b"#?RADIANCE\nEXPOSURE=2\nEXPOSURE= 4\n"
     (tmp_path / "odd.hdr").write_bytes(head + b"\n-Y 2 +X 4\n" + rgbe)
-    image, facts = decoder.read_with_facts(tmp_path / "odd.hdr")
-    np.testing.assert_allclose(image.pixels[0, 0], [1.0, 0.5, 0.25], atol=0.01)
+    found, facts = decoder.read_pixels(tmp_path / "odd.hdr")
+    np.testing.assert_allclose(found[0, 0], [1.0, 0.5, 0.25], atol=0.01)
     assert facts.exposure == 8
 
 
