@@ -321,7 +321,10 @@ def test_what_goes_wrong_outside_is_one_line(
 def test_ctrl_c_stops_a_render_and_leaves_nothing(tmp_path: Path) -> None:
     import pty
 
-    ours, theirs = pty.openpty()  # progress is shown to a terminal only
+    try:
+        ours, theirs = pty.openpty()  # progress is shown to a terminal only
+    except OSError as error:  # a chroot without /dev/pts
+        pytest.skip(f"this machine gives no terminal: {error}")
     paths = os.pathsep.join(str(ROOT / folder) for folder in (".", "ui", "plugins"))
     command = "import sys; from studio.cli import main; sys.exit(main())"
     demo = ["demo", "--headless", "-o", str(tmp_path / "x.png"), "--param", "directions=131072"]
