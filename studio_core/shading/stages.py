@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from studio_core.contract import Services
+from studio_core.errors import EditError
 from studio_core.kernels.camera import first_hits, sample_directions
 from studio_core.kernels.directions import LARGEST
 from studio_core.kernels.light_tree import LightTree, integrate_environment
@@ -80,6 +81,8 @@ class SurfaceStage:
         table: dict[str, int] = {}
         items = []
         for node, geometry, materials in sources:
+            if len(geometry.faces) and not materials:  # a script's: edits and project files refuse it
+                raise EditError(f"{scene[node].name!r} cannot be shaded: it has no material")
             slots = [table.setdefault(material, len(table)) for material in materials]
             items.append((node, geometry, scene.world(node), slots))
         sizes = [(geometry, world.scale) for _, geometry, world, _ in items]

@@ -33,7 +33,7 @@ from studio_core.scene.nodes import (
     SpotLamp,
 )
 from studio_core.session import View, framing
-from studio_core.shading.materials import linear
+from studio_core.shading.materials import linear_rgb
 from studio_plugins.export.mitsuba_xml import matrix, prop, put, rgb, vector
 
 F64 = npt.NDArray[np.float64]
@@ -46,9 +46,7 @@ def resampled(image: Image) -> npt.NDArray[np.float32]:
     Mitsuba's first and last row lie on the poles, ours half a pixel away. With rows at the centres and the
     borders of ours, linear interpolation gives the same everywhere (poles: the nearest row).
     """
-    pixels = linear(image)[..., :3]
-    if pixels.shape[2] == 1:
-        pixels = np.repeat(pixels, 3, axis=2)
+    pixels = linear_rgb(image)
     height, width, _ = pixels.shape
     made = np.empty((2 * height + 1, width, 3), np.float32)
     made[1::2] = pixels

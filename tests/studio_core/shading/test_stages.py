@@ -11,6 +11,7 @@ from scenes import cube, sky
 from studio_core import edits
 from studio_core.contract import Services
 from studio_core.document import Document
+from studio_core.errors import EditError
 from studio_core.raster import PictureStage
 from studio_core.scene.diff import Changes
 from studio_core.scene.geometry import Geometry, Image
@@ -168,6 +169,13 @@ def test_any_picture_may_be_an_environment(watched, image):
     grey = Image(np.full((8, 16, 3), 0.5, np.float32))
     same, made = (watched.apply(edits.SetFields("sky", {"image": i})).linear for i in (grey, image))
     np.testing.assert_allclose(made, same, rtol=0.01)
+
+
+def test_a_mesh_without_material_is_refused_in_a_sentence(services, host, little_scene):
+    scene = little_scene()
+    bare = dataclasses.replace(scene["cube"], materials=())
+    with pytest.raises(EditError, match="'Cube' cannot be shaded"):
+        Watched(scene.with_nodes(bare), services, host)
 
 
 def test_an_empty_mesh_of_glass_is_no_obstacle(services, host):
