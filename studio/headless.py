@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import contextlib
+import signal
 import sys
+import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -12,6 +14,7 @@ from functools import cached_property
 from typing import TextIO
 
 from studio_core.contract import Services
+from studio_core.errors import Cancelled
 from studio_core.registry import PluginHost
 from studio_core.shading.job import Job
 
@@ -53,7 +56,10 @@ class Headless:
 
     @contextmanager
     def job(self, label: str) -> Iterator[Job]:
-        """A job whose progress is shown on stderr while it is a terminal, and timed at its end."""
+        """A job whose progress is shown on stderr while it is a terminal, and timed at its end.
+
+        Ctrl-C cancels it, which ends in KeyboardInterrupt at its next checkpoint.
+        """
         shown = not self.quiet and sys.stderr is not None and sys.stderr.isatty()
         last = 0.0
 
@@ -65,8 +71,10 @@ class Headless:
                 self.say(f"\r{label}: {100 * job.done // job.total:3d} %", end="")
 
         started = time.monotonic()
+        job = Job(label, progress)
         try:
-            yield Job(label, progress)
+            with _interrupts(job):
+                yield job
         except BaseException:
             if last:
                 self.say("")  # what follows gets a line of its own
@@ -79,3 +87,29 @@ class Headless:
         """Join the threads."""
         if "services" in self.__dict__:
             self.services.workers.close()
+
+
+@contextmanager
+def _interrupts(job: Job) -> Iterator[None]:
+    """Inside, the first Ctrl-C cancels the job.
+
+    Raised wherever it comes, KeyboardInterrupt is lost inside a compiler's callback.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+
+    def stop(number: int, frame: object) -> None:
+        if job.cancelled:
+            raise KeyboardInterrupt
+        job.cancel()
+
+    before = signal.signal(signal.SIGINT, stop)
+    try:
+        yield
+    except Cancelled:
+        raise KeyboardInterrupt from None
+    finally:
+        signal.signal(signal.SIGINT, before)
+    if job.cancelled:
+        raise KeyboardInterrupt
