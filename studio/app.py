@@ -45,6 +45,7 @@ class PluginShading:
 
     def __init__(self, services: Services) -> None:
         self._services = services
+        self._meter: Any = None  # keeps textures' tables; made on the compute thread, it loads kernels
 
     def pipeline(self, backend: str) -> Pipeline:
         """The backend's stages and the picture they end in."""
@@ -57,7 +58,9 @@ class PluginShading:
         """The error of what the pipeline last made."""
         from studio_core.shading.error_meter import ErrorMeter
 
-        return ErrorMeter(self._services)(pipeline, frame, job)
+        self._meter = self._meter or ErrorMeter(self._services)
+        found: MeasuredError | None = self._meter(pipeline, frame, job)
+        return found
 
     def params(self, backend: str, values: Mapping[str, Any]) -> Any:
         """The backend's parameters, checked."""

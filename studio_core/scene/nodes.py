@@ -141,7 +141,7 @@ class SpotLamp(Light):
 
 @dataclass(frozen=True, kw_only=True)
 class DirectionalLamp(Light):
-    """Sunlight along its local -z from a disc; `intensity` is irradiance on a surface facing each part of it."""
+    """Sunlight along its local -z from a disc; each part gives `intensity` to a surface that faces it."""
 
     angle: float = param(0.53, "Angular size", "Diameter of the disc", unit="°", low=0.0, high=90.0)
 
