@@ -155,14 +155,6 @@ class Services:
     cache: DiskCache | None = None
 
 
-class Progress(Protocol):
-    """The part of a job that kernels need."""
-
-    def checkpoint(self, done: int = 0, total: int = 0) -> None:
-        """Report, or raise Cancelled."""
-        ...
-
-
 __all__ = [
     "API",
     "KINDS",
@@ -172,7 +164,6 @@ __all__ = [
     "Importer",
     "Job",
     "Plugin",
-    "Progress",
     "Registry",
     "Services",
     "ShadingBackend",
