@@ -19,7 +19,7 @@ from studio_core.shading.job import Job
 from studio_core.shading.lamps import shown_environment
 from studio_core.shading.materials import Resolved, coefficients, linear_rgb, resolve
 from studio_core.shading.pipeline import Inputs
-from studio_core.shading.stages import pinhole
+from studio_core.shading.primary import pinhole
 
 F32 = npt.NDArray[np.float32]
 I64 = npt.NDArray[np.int64]

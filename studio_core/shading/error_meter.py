@@ -35,7 +35,7 @@ from studio_core.shading.brute_force import VisibilityBits, all_points, environm
 from studio_core.shading.frame import Frame
 from studio_core.shading.job import Job
 from studio_core.shading.pipeline import Pipeline
-from studio_core.shading.stages import pinhole
+from studio_core.shading.primary import pinhole
 
 F32 = npt.NDArray[np.float32]
 F64 = npt.NDArray[np.float64]

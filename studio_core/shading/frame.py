@@ -11,9 +11,14 @@ from studio_core.session import View
 
 @dataclass(frozen=True)
 class Frame:
-    """Scene, view and the backend's parameters; `revision` grows with every request."""
+    """Scene, view and the backend's parameters; `revision` grows with every request.
+
+    While `moving`, somebody drags or looks around: soon is better than exact, and a frame at rest, with
+    changes of at least VIEW, follows.
+    """
 
     scene: Scene
     view: View
     params: Any
     revision: int = 0
+    moving: bool = False

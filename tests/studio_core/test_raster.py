@@ -15,7 +15,7 @@ from studio_core.scene.nodes import Camera, Environment, Material, MeshObject, P
 from studio_core.scene.transform import Transform, looking
 from studio_core.session import View
 from studio_core.shading.offline import backend_params, picture
-from studio_core.shading.stages import pinhole
+from studio_core.shading.primary import pinhole
 
 
 def rays_of(view):

@@ -47,6 +47,7 @@ class Shown:
     view: View
     final: bool
     seconds: float
+    moving: bool = False
 
 
 class Shading(Protocol):
@@ -270,7 +271,8 @@ class PictureFeed:
         changes, self._changes = self._changes, Changes()
         self._answered = False
         quick = self.moving or self.last is None
-        frame = Frame(self._document.scene, self.frame_view(quick), self._session.params)
+        view = self.frame_view(quick)
+        frame = Frame(self._document.scene, view, self._session.params, moving=self.moving)
         asked, finer_only, self._finer_only = time.monotonic(), self._finer_only, True
         revision = self._revision = self._revision + 1  # as the scheduler counts
         self._asked[revision] = asked
@@ -284,28 +286,32 @@ class PictureFeed:
             self._rests = True  # first let the quick picture be seen
             return
         self._rests = False
-        if self.last is None or self._coarse(self.last.view) or self._changes:
+        if self.last is None or self._coarse(self.last) or self._changes:
             self.want(view_changed(), finer=True)
 
-    def _coarse(self, view: View) -> bool:
-        """Whether a picture at rest has other pixels or samples."""
-        rest = self.frame_view(False)
-        return (view.width, view.height, view.antialias) != (rest.width, rest.height, rest.antialias)
+    def _coarse(self, shown: Shown | Frame) -> bool:
+        """Whether a picture at rest is more exact, or has other pixels or samples."""
+        rest, view = self.frame_view(False), shown.view
+        return shown.moving or (view.width, view.height, view.antialias) != (
+            rest.width,
+            rest.height,
+            rest.antialias,
+        )
 
     def _show(self, frame: Frame, picture: Picture, final: bool) -> None:
         self._answered = True
         asked = self._asked.get(frame.revision, time.monotonic())
         self._asked = {r: t for r, t in self._asked.items() if r >= frame.revision}
-        self.last = Shown(picture, frame.view, final, time.monotonic() - asked)
+        self.last = Shown(picture, frame.view, final, time.monotonic() - asked, frame.moving)
         self.shown.emit(self.last)
         self.measured.emit(None)
         if frame.revision < self._outdated or (self._changes and not self._finer_only):
             self._tell(Freshness.STALE)
         else:
             waits = bool(self._changes) or any(r > frame.revision for r in self._asked)
-            finer = waits or not final or self._coarse(frame.view)
+            finer = waits or not final or self._coarse(frame)
             self._tell(Freshness.REFINING if finer else Freshness.CURRENT)
-        if self._coarse(frame.view) and not self.moving and not self._changes:
+        if self._coarse(frame) and not self.moving and not self._changes:
             self._later(0, self._rest)
         self._again()
 

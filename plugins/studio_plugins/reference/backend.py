@@ -25,7 +25,8 @@ from studio_core.shading.brute_force import (
 from studio_core.shading.frame import Frame
 from studio_core.shading.job import Job
 from studio_core.shading.pipeline import Inputs
-from studio_core.shading.stages import SurfaceParams, common_stages, visible_vertices
+from studio_core.shading.primary import visible_vertices
+from studio_core.shading.stages import SurfaceParams, common_stages
 
 STEPS = (10, 12, 15, 17)
 

@@ -12,7 +12,7 @@ from studio_core.kernels.camera import sample_directions
 from studio_core.kernels.compose import background_samples, shade_samples, texel
 from studio_core.scene.transform import looking
 from studio_core.session import View
-from studio_core.shading.stages import pinhole
+from studio_core.shading.primary import pinhole
 
 
 @given(

@@ -15,7 +15,7 @@ from studio_core.params import defaults
 from studio_core.scene.transform import looking
 from studio_core.session import View
 from studio_core.shading.artifacts import TERMS
-from studio_core.shading.stages import pinhole
+from studio_core.shading.primary import pinhole
 
 QUICK = settings(max_examples=60)
 DIRECTIONS = direction_set(10)
