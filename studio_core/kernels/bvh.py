@@ -354,3 +354,7 @@ class BvhDevice:
     ) -> BvhScene:
         """Places meshes by 3×4 matrices; a None leaves its number unused."""
         return BvhScene(meshes, transforms)
+
+    def alone(self, mesh: BvhMesh) -> BvhScene:
+        """A scene of one mesh where it stands."""
+        return BvhScene([mesh], [np.eye(4)[:3]])

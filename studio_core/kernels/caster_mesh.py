@@ -61,15 +61,24 @@ class Device(Protocol):
     def scene(self, meshes: Sequence[Any], transforms: Sequence[F64 | None]) -> Scene:
         """Places meshes."""
 
+    def alone(self, mesh: Any) -> Any:
+        """A scene, told by its `pointer`, of one mesh where it stands."""
+
 
 @dataclass(frozen=True)
 class SharedMesh:
-    """A mesh as the tracer holds it: around its middle, opaque faces first, degenerate ones dropped."""
+    """A mesh as the tracer holds it: around its middle, opaque faces first, degenerate ones dropped.
 
-    mesh: Any  # None when no face is left
+    `alone` is a scene of it (both None when no face is left); `radius` reaches from the middle to its
+    farthest point.
+    """
+
+    mesh: Any
+    alone: Any
     shape: tuple[int, int]
     middle: F64
     half: F64
+    radius: float
     face_ids: npt.NDArray[np.int32]
     opaque: int
 
@@ -113,14 +122,14 @@ def prepare_mesh(device: Device, item: CasterObject) -> SharedMesh:
     whole = (np.cross(b - a, c - a) != 0).any(axis=1)
     kept = np.concatenate([np.flatnonzero(whole & opaque), np.flatnonzero(whole & ~opaque)])
     count = int((whole & opaque).sum())
-    mesh = None
+    mesh = alone = None
     if len(kept):
         triangles = np.ascontiguousarray(faces[kept], np.uint32)
         mesh = device.mesh(around, triangles, count)
+        alone = device.alone(mesh)
     shape = (len(positions), len(faces))
-    return SharedMesh(
-        mesh, shape, middle, (high - low) / 2, kept.astype(np.int32), int((whole & opaque).sum())
-    )
+    radius = float(np.linalg.norm(used - middle, axis=1).max())
+    return SharedMesh(mesh, alone, shape, middle, (high - low) / 2, radius, kept.astype(np.int32), count)
 
 
 def affine(transform: npt.ArrayLike, key: str) -> F64:

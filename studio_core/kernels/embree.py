@@ -128,6 +128,10 @@ class EmbreeDevice:
         """Places meshes by 3×4 matrices; a None leaves its number unused."""
         return EmbreeScene(self, meshes, transforms)
 
+    def alone(self, mesh: EmbreeMesh) -> EmbreeMesh:
+        """A mesh is a scene of its own: no instance stands between it and its rays."""
+        return mesh
+
     def _check_layout(self) -> None:
         """Traces one packet: a library with another packet layout must not be used."""
         positions = np.array([[0, 0, 0], [4, 0, 0], [0, 4, 0]], np.float32)

@@ -30,7 +30,7 @@ from studio_core.kernels.packets import EVERYTHING, OPAQUE
 from studio_core.kernels.ray_batches import closest_chunk, occluded_chunk
 from studio_core.parallel import Checkpoints, Workers
 
-__all__ = ["EPSILON_ULPS", "CasterHandles", "CasterObject", "Hits", "RayCaster"]
+__all__ = ["EPSILON_ULPS", "CasterHandles", "CasterObject", "CasterPart", "Hits", "RayCaster"]
 
 F32 = npt.NDArray[np.float32]
 F64 = npt.NDArray[np.float64]
@@ -75,6 +75,22 @@ class CasterHandles:
     face_start: npt.NDArray[np.int64]
     face_ids: npt.NDArray[np.int32]
     normals: F32
+
+
+@dataclass(frozen=True)
+class CasterPart:
+    """One object by itself, in its own frame: three times as many rays a second as through an instance.
+
+    `scene` is traced with the caster's addresses (0: it has no face that could be met). A world point x is
+    from_world @ (x, 1) in that frame, where lengths are `scale` times those of the world; in the world the
+    object lies within the sphere of `centre` and `radius`.
+    """
+
+    scene: int
+    from_world: F64
+    scale: float
+    centre: F64
+    radius: float
 
 
 class RayCaster:
@@ -167,6 +183,18 @@ class RayCaster:
             self._face_ids,
             self._normals,
         )
+
+    def part(self, index: int) -> CasterPart:
+        """An object by itself; ask again after a move. Only uniform scales."""
+        shared, transform = self._objects[index], self._transforms[index]
+        linear = transform[:3, :3]
+        scale = float(np.cbrt(abs(np.linalg.det(linear))))
+        centre = linear @ shared.middle + transform[:3, 3]
+        if shared.alone is None or self._placed(index) is None:
+            return CasterPart(0, np.eye(4)[:3], 1.0, centre, 0.0)
+        inverse = np.linalg.inv(linear)
+        from_world = np.column_stack([inverse, -inverse @ centre])
+        return CasterPart(shared.alone.pointer, from_world, 1 / scale, centre, shared.radius * scale)
 
     def occluded(
         self,

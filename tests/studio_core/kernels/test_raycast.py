@@ -13,6 +13,7 @@ from oracles.raycast import nearest
 
 from studio_core.errors import InputError
 from studio_core.kernels.packets import EVERYTHING, OPAQUE
+from studio_core.kernels.ray_batches import occluded_chunk
 from studio_core.kernels.raycast import CasterObject, RayCaster
 from studio_core.parallel import Workers
 
@@ -473,3 +474,32 @@ def test_a_library_that_is_none_is_refused(tmp_path: object) -> None:
     junk.write_bytes(b"junk")
     with pytest.raises(embree.EmbreeUnavailableError, match="could not be loaded"):
         embree.EmbreeDevice(junk)
+
+
+def test_a_part_alone_is_met_as_in_the_scene(backend: str, workers: Workers) -> None:
+    rng = np.random.default_rng(3)
+    faces = np.array([[0, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2]], np.uint32)
+    corners = rng.normal(size=(4, 3)).astype(np.float32) + 5
+    turn, _ = np.linalg.qr(rng.normal(size=(3, 3)))
+    matrix = np.eye(4)
+    matrix[:3, :3], matrix[:3, 3] = 0.3 * turn * np.sign(np.linalg.det(turn)), (2, -1, 7)
+    with RayCaster([CasterObject(corners, faces, "one", matrix)], backend) as caster:
+        part = caster.part(0)
+        assert part.scale == pytest.approx(1 / 0.3)
+        world = corners.astype(np.float64) @ matrix[:3, :3].T + matrix[:3, 3]
+        far = np.linalg.norm(world - part.centre, axis=1).max()
+        assert far == pytest.approx(part.radius, rel=1e-5)
+        origins = part.centre + rng.normal(size=(4000, 3))
+        along = part.centre + 0.2 * rng.normal(size=(4000, 3)) - origins
+        along /= np.linalg.norm(along, axis=1, keepdims=True)
+        expected = caster.occluded(origins, along, np.inf, workers)
+        own = (origins @ part.from_world[:, :3].T + part.from_world[:, 3]).astype(np.float32)
+        own_along = (along @ part.from_world[:, :3].T / part.scale).astype(np.float32)
+        found = np.zeros(4000, bool)
+        far_away = np.full(4000, np.inf, np.float32)
+        handles = caster.handles()
+        occluded_chunk(
+            handles.occluded8, part.scene, own, own_along, far_away, np.uint32(OPAQUE), found, 0, 4000
+        )
+        assert 0.1 < expected.mean() < 0.9
+        assert (found != expected).sum() <= 2  # rays that graze an edge
