@@ -6,11 +6,12 @@ Machines are shared and noisy: compare ratios of figures from one run, never sec
 from __future__ import annotations
 
 import json
+import math
 import os
 import platform
 import subprocess
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
@@ -75,6 +76,15 @@ class Timing:
     median: float
     spread: float
 
+    @classmethod
+    def of(cls, seconds: Iterable[float]) -> Timing:
+        """Of what was measured; nan where nothing was."""
+        taken = list(seconds)
+        if not taken:
+            return cls(math.nan, math.nan)
+        low, middle, high = np.percentile(taken, [25, 50, 75])
+        return cls(float(middle), float(high - low) / 2)
+
 
 def timed(call: Callable[[], object], repeats: int, warm_up: int = 1) -> Timing:
     """Time a call after `warm_up` unmeasured ones."""
@@ -85,14 +95,60 @@ def timed(call: Callable[[], object], repeats: int, warm_up: int = 1) -> Timing:
         started = time.perf_counter()
         call()
         taken.append(time.perf_counter() - started)
-    low, middle, high = np.percentile(taken, [25, 50, 75])
-    return Timing(float(middle), float(high - low) / 2)
+    return Timing.of(taken)
 
 
 def relative_rmse(made: Any, truth: Any) -> float:
     """sqrt(mean((made − truth)²)) / mean(truth): the house's error, over all given values."""
     a, b = np.asarray(made, np.float64), np.asarray(truth, np.float64)
     return float(np.sqrt(np.mean((a - b) ** 2)) / np.mean(b))
+
+
+def relative_p99(made: Any, truth: Any) -> float:
+    """99th percentile over places of |made − truth| (..., 3), channels averaged, over mean(truth)."""
+    a, b = np.asarray(made, np.float64), np.asarray(truth, np.float64)
+    return float(np.percentile(np.abs(a - b).mean(axis=-1), 99) / np.mean(b))
+
+
+def unbiased_rmse(made: Any, first: Any, second: Any) -> float:
+    """`relative_rmse` against what two independent noisy estimates of the truth have in common.
+
+    mean((made − first) (made − second)) is the squared error alone: the estimates' noise has mean zero
+    and is independent, so that it drops out. 0 where noise makes it negative.
+    """
+    a, b, c = (np.asarray(values, np.float64) for values in (made, first, second))
+    squared = float(np.mean((a - b) * (a - c)))
+    return math.sqrt(max(squared, 0.0)) / float(np.mean((b + c) / 2))
+
+
+@dataclass(frozen=True)
+class PowerLaw:
+    """y = scale · x^exponent; `misfit` is the RMS of ln(y / fit)."""
+
+    scale: float
+    exponent: float
+    misfit: float = 0.0
+
+    @classmethod
+    def fit(cls, x: Iterable[float], y: Iterable[float]) -> PowerLaw:
+        """Least squares of logarithms over positive pairs; ValueError with fewer than two different x."""
+        pairs = [(a, b) for a, b in zip(x, y, strict=True) if a > 0 and b > 0]
+        if len({a for a, _ in pairs}) < 2:
+            raise ValueError("a power law needs two different places")
+        u, v = np.log(np.array(pairs, np.float64)).T
+        exponent, level = np.polyfit(u, v, 1)
+        misfit = float(np.sqrt(np.mean((v - exponent * u - level) ** 2)))
+        return cls(float(np.exp(level)), float(exponent), misfit)
+
+    def at(self, x: float) -> float:
+        """y there."""
+        return self.scale * float(x) ** self.exponent
+
+    def where(self, y: float) -> float:
+        """The x that gives `y` > 0; ValueError for a law that does not change."""
+        if self.exponent == 0 or y <= 0:
+            raise ValueError("this power law never gets there")
+        return float((y / self.scale) ** (1 / self.exponent))
 
 
 def commit() -> str:

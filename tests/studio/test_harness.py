@@ -13,7 +13,18 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import studio.bench.harness as harness
-from studio.bench.harness import Report, Row, Timing, commit, machine, relative_rmse, timed
+from studio.bench.harness import (
+    PowerLaw,
+    Report,
+    Row,
+    Timing,
+    commit,
+    machine,
+    relative_p99,
+    relative_rmse,
+    timed,
+    unbiased_rmse,
+)
 from studio.bench.run import SUITES
 from studio.cli import main
 from studio_core import __version__
@@ -67,6 +78,52 @@ def test_relative_rmse_does_not_depend_on_the_unit(pairs: list[tuple[float, floa
     assert relative_rmse(truth * (1 + scale), truth) == pytest.approx(
         scale * np.sqrt((truth**2).mean()) / truth.mean()
     )
+
+
+def test_nothing_measured_has_no_median() -> None:
+    found = Timing.of([])
+    assert np.isnan([found.median, found.spread]).all()
+
+
+def test_the_99th_percentile_is_over_places_not_channels() -> None:
+    truth = np.full((101, 3), 2.0)
+    made = truth.copy()
+    made[:, 0] += 3 * np.arange(101)  # place k is off by k on average over its channels
+    assert relative_p99(made, truth) == pytest.approx(99 / 2)
+    assert relative_p99(truth.reshape(1, 101, 3), truth.reshape(1, 101, 3)) == 0
+
+
+def test_independent_noise_of_the_truth_drops_out() -> None:
+    rng = np.random.default_rng(1)
+    truth = rng.uniform(0.5, 1.5, (200_000, 3))
+    first, second = (truth + rng.normal(0, 0.1, truth.shape) for _ in range(2))
+    made = truth + rng.normal(0, 0.03, truth.shape)
+    assert unbiased_rmse(made, first, second) == pytest.approx(0.03 / truth.mean(), rel=0.03)
+    assert relative_rmse(made, (first + second) / 2) > 0.07  # what the noise would have made of it
+    assert unbiased_rmse(truth, first, second) < 0.005
+
+
+def test_without_noise_it_is_the_house_error() -> None:
+    assert unbiased_rmse([2, 0], [1, 1], [1, 1]) == relative_rmse([2, 0], [1, 1])
+
+
+@given(st.floats(1e-3, 1e3), st.floats(-3, 3).filter(lambda p: abs(p) > 0.01))
+def test_a_power_law_is_found_again(scale: float, exponent: float) -> None:
+    x = [0.5, 1.0, 3.0, 20.0]
+    found = PowerLaw.fit(x, [scale * place**exponent for place in x])
+    assert found.scale == pytest.approx(scale)
+    assert found.exponent == pytest.approx(exponent)
+    assert found.misfit < 1e-6
+    assert found.where(found.at(7.0)) == pytest.approx(7.0)
+
+
+def test_a_power_law_needs_two_places_and_a_slope() -> None:
+    with pytest.raises(ValueError, match="two different"):
+        PowerLaw.fit([1, 1, 2], [3, 4, 0])
+    with pytest.raises(ValueError, match="never"):
+        PowerLaw(2.0, 0.0).where(3.0)
+    with pytest.raises(ValueError, match="never"):
+        PowerLaw(2.0, -0.5).where(0.0)
 
 
 # --- what is written ----------------------------------------------------------------------------------
