@@ -13,7 +13,10 @@ from typing import NoReturn
 from studio_core import __version__
 from studio_core.errors import InputError, LucarneError
 
-VERBS = ("demo", "new", "info", "render", "radiance", "export", "script", "bench", "stress", "doctor")
+VERBS = (
+    *("demo", "new", "info", "render", "radiance", "precompute", "export"),
+    *("script", "bench", "stress", "doctor"),
+)
 BAD_INPUT, OUR_FAULT, INTERRUPTED, NOBODY_READS = 2, 70, 130, 141
 TRACEBACK = "LUCARNE_TRACEBACK"
 MOST_THREADS = 1024
@@ -121,6 +124,10 @@ def _run(options: argparse.Namespace) -> int:
                 from studio.doctor import doctor
 
                 return doctor(options, program)
+            if options.verb == "precompute":
+                from studio.verbs_precompute import precompute
+
+                return precompute(options, program) or 0
             return getattr(verbs, options.verb)(options, program) or 0
     finally:
         program.close()
@@ -212,6 +219,11 @@ def parser() -> argparse.ArgumentParser:
     radiance.add_argument("--camera", metavar="NAME", help="towards this camera (default: the first)")
     _backend_options(radiance)
 
+    precompute = verb("precompute", "make now what a backend keeps on disk for a project")
+    precompute.add_argument("project", type=Path, metavar="PROJECT")
+    precompute.add_argument("--camera", metavar="NAME", help="from here first (default: the first camera)")
+    _backend_options(precompute, "cuts")
+
     export = verb("export", "write a project as GLB, or as a Mitsuba 3 scene folder")
     export.add_argument("project", type=Path, metavar="PROJECT")
     export.add_argument("-o", "--out", type=Path, required=True, metavar="(OUT.glb|DIR)")
@@ -230,8 +242,10 @@ def parser() -> argparse.ArgumentParser:
     return made
 
 
-def _backend_options(verb: argparse.ArgumentParser) -> None:
-    verb.add_argument("--backend", default="reference", metavar="ID", help="how light is summed")
+def _backend_options(verb: argparse.ArgumentParser, default: str = "reference") -> None:
+    verb.add_argument(
+        "--backend", default=default, metavar="ID", help=f"how light is summed (default: {default})"
+    )
     verb.add_argument(
         "--param",
         action="append",
