@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from studio_core.errors import Cancelled
@@ -139,6 +139,52 @@ class PictureStage(Stage):
         return Picture([*parts, inputs[Summary], frame.view])
 
 
+class Detail(int):
+    """How finely the places are looked at."""
+
+
+class DetailStage(Stage):
+    """Wants a finer round until it is at `most`."""
+
+    needs = (Places,)
+    gives = Detail
+    most = 3
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.proven = 0
+        self.proposed: int | None = None
+        self.asked = 0
+
+    def make(self, frame: Frame, inputs: Inputs) -> Detail:
+        made = Detail(self.proven if self.proposed is None else self.proposed)
+        return inputs.previous if made == inputs.previous else made
+
+    def again(self, frame: Frame, made: Mapping[type, Any], rounds: int, job: Job) -> bool:
+        self.asked += 1
+        if self.proposed is not None:
+            self.proven, self.proposed = self.proposed, None
+        job.checkpoint(0, 2)
+        assert made[Detail] == self.proven
+        if self.proven == self.most:
+            return False
+        self.proposed = self.proven + 1
+        job.checkpoint(1, 2)
+        return True
+
+    def abandon(self) -> None:
+        self.proposed = None
+
+
+class DetailedPicture(PictureStage):
+    """Tells the detail, too."""
+
+    needs = (*PictureStage.needs, Detail)
+
+    def make(self, frame: Frame, inputs: Inputs) -> Picture:
+        return Picture([*super().make(frame, inputs), inputs[Detail]])
+
+
 KINDS: list[type[Stage]] = [
     PlacesStage,
     LooksStage,
@@ -152,6 +198,11 @@ KINDS: list[type[Stage]] = [
 def counting_stages() -> list[Stage]:
     """Fresh stages."""
     return [kind() for kind in KINDS]
+
+
+def refining_stages() -> list[Stage]:
+    """Fresh stages, of which one refines."""
+    return [*(kind() for kind in KINDS[:-1]), DetailStage(), DetailedPicture()]
 
 
 def from_scratch(scene: Scene, view: View) -> Picture:

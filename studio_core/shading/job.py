@@ -74,3 +74,12 @@ class Job:
             yield
         finally:
             self._finish = before
+
+    @contextmanager
+    def unheard(self) -> Iterator[None]:
+        """Inside, nobody listens: what is finer is on the screen already."""
+        before, self._on_publish = self._on_publish, None
+        try:
+            yield
+        finally:
+            self._on_publish = before

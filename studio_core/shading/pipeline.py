@@ -4,6 +4,9 @@ A stage reruns when a change dirties it or when something it needs was rebuilt. 
 stage until it succeeds, so cancelled work is not forgotten. A stage that returns its previous artifact
 (the same object) counts as not rebuilt, and what follows is skipped. A partial artifact that a stage
 publishes flows through the stages after it.
+
+When all stages are through and the frame is at rest, a stage that can make the picture truer (`Refining`)
+may ask for another round: what there is so far is published, and the stages concerned run again.
 """
 
 from __future__ import annotations
@@ -12,13 +15,14 @@ import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
-from typing import Any, Protocol, TypeVar
+from typing import Any, Protocol, TypeVar, runtime_checkable
 
 from studio_core.scene.diff import Aspect, Changes, everything
 from studio_core.shading.frame import Frame
 from studio_core.shading.job import Job
 
 A = TypeVar("A")
+MOST_ROUNDS = 12
 
 
 @dataclass(frozen=True)
@@ -58,9 +62,26 @@ class Stage(Protocol):
         ...
 
 
+@runtime_checkable
+class Refining(Protocol):
+    """A stage that may want another round after it has seen what became of its artifact."""
+
+    def again(self, frame: Frame, made: Mapping[type, Any], rounds: int, job: Job) -> bool:
+        """Whether to run again, differently; `made` are all artifacts, `rounds` how many there were.
+
+        Asked once after every round, so that the stage also learns that its last one came through.
+        """
+        ...
+
+    def abandon(self) -> None:
+        """The round that was asked for did not come through: `run` gives again what it gave before it."""
+        ...
+
+
 @dataclass
 class _Record:
     pending: Changes
+    again: bool = False
     seen: dict[type, int] = field(default_factory=dict)
     artifact: Any = None
     stamp: int = 0
@@ -68,12 +89,13 @@ class _Record:
 
 @dataclass(frozen=True)
 class StageRun:
-    """One line of a report: which stage, whether it ran, whether it gave something new, seconds."""
+    """One line of a report: which stage, whether it ran, whether it gave something new, seconds, round."""
 
     name: str
     ran: bool
     rebuilt: bool
     seconds: float
+    round: int = 0
 
 
 class Pipeline:
@@ -90,6 +112,7 @@ class Pipeline:
             given.add(stage.gives)
         self.stages = tuple(stages)
         self.current = 0
+        self.rounds = 0
         self.report: list[StageRun] = []
         self._records: list[_Record] | None = None
 
@@ -114,17 +137,69 @@ class Pipeline:
         return any(stage.dirtied_by & changes.aspects for stage in self.stages[: upto + 1])
 
     def update(self, frame: Frame, changes: Changes, job: Job) -> Any:
-        """Bring everything up to date; the last stage's artifact. Raises Cancelled between and in stages."""
+        """Bring everything up to date; the last stage's artifact. Raises Cancelled between and in stages.
+
+        While the frame is at rest, stages are asked for further rounds. What follows the first round is
+        spare work: any change that concerns a stage disturbs it.
+        """
         self.mark(frame, changes)
+        self.report, self.rounds = [], 0
+        result = self._round(frame, job)
+        while not frame.moving:
+            self.current = len(self.stages) - 1
+            asking = self._asking(frame, job)
+            if not asking:
+                break
+            job.publish(result)
+            self.rounds += 1
+            try:
+                with job.unheard():
+                    result = self._round(frame, job)
+            except BaseException:
+                self._abandon(asking)
+                raise
+        return result
+
+    def _asking(self, frame: Frame, job: Job) -> list[int]:
+        """Which stages want another round; none when there were too many."""
         assert self._records is not None
-        self.report = []
+        made = {stage.gives: r.artifact for stage, r in zip(self.stages, self._records, strict=True)}
+        able = [index for index, stage in enumerate(self.stages) if isinstance(stage, Refining)]
+        asking: list[int] = []
+        try:
+            for index in able:
+                stage = self.stages[index]
+                if isinstance(stage, Refining) and stage.again(frame, made, self.rounds, job):
+                    asking.append(index)
+                    self._records[index].again = True
+        except BaseException:
+            self._abandon(able)
+            raise
+        if self.rounds == MOST_ROUNDS:
+            self._abandon(asking)
+            return []
+        return asking
+
+    def _abandon(self, indices: Sequence[int]) -> None:
+        assert self._records is not None
+        for index in indices:
+            stage = self.stages[index]
+            if isinstance(stage, Refining):
+                stage.abandon()
+                self._records[index].again = True  # to give again what it gave before
+
+    def _round(self, frame: Frame, job: Job) -> Any:
+        """All stages once."""
+        assert self._records is not None
         made: dict[type, tuple[Any, int]] = {}
         for index, (stage, record) in enumerate(zip(self.stages, self._records, strict=True)):
-            self.current = index
+            if not self.rounds:
+                self.current = index
             job.checkpoint()
             rebuilt = frozenset(need for need in stage.needs if record.seen.get(need) != made[need][1])
             started = time.perf_counter()
-            ran = record.stamp == 0 or bool(rebuilt or stage.dirtied_by & record.pending.aspects)
+            dirty = record.again or rebuilt or stage.dirtied_by & record.pending.aspects
+            ran = record.stamp == 0 or bool(dirty)
             before = record.stamp
             if ran:
                 artifacts = {need: made[need][0] for need in stage.needs}
@@ -136,10 +211,11 @@ class Pipeline:
                     record.artifact = result
                     record.stamp += 1
                 record.seen = {need: made[need][1] for need in stage.needs}
-            record.pending = Changes()
+            record.pending, record.again = Changes(), False
             made[stage.gives] = (record.artifact, record.stamp)
             seconds = time.perf_counter() - started
-            self.report.append(StageRun(type(stage).__name__, ran, record.stamp != before, seconds))
+            line = StageRun(type(stage).__name__, ran, record.stamp != before, seconds, self.rounds)
+            self.report.append(line)
         return self._records[-1].artifact
 
     def _flow(self, frame: Frame, index: int, made: Mapping[type, Any], job: Job, artifact: Any) -> Any:

@@ -11,6 +11,8 @@ import pytest
 from counting_stages import (
     Count,
     CountStage,
+    Detail,
+    DetailStage,
     GainsStage,
     LooksStage,
     Picture,
@@ -23,6 +25,7 @@ from counting_stages import (
     SummaryStage,
     counting_stages,
     from_scratch,
+    refining_stages,
 )
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -37,7 +40,7 @@ from studio_core.scene.transform import Transform
 from studio_core.session import View
 from studio_core.shading.frame import Frame
 from studio_core.shading.job import Job
-from studio_core.shading.pipeline import Inputs, Pipeline
+from studio_core.shading.pipeline import MOST_ROUNDS, Inputs, Pipeline
 
 NOTHING = Changes()
 
@@ -300,6 +303,125 @@ def test_any_sequence_ends_like_a_fresh_start_and_runs_only_what_it_must(
         if result is not None:
             assert result == from_scratch(bench.scene, bench.view)
     assert result == from_scratch(bench.scene, bench.view)
+
+
+# ---------------------------------------------------------------- rounds of refinement
+
+
+class Looked(Bench):
+    """A bench whose stages refine, and what it published."""
+
+    def __init__(self) -> None:
+        super().__init__(refining_stages())
+        self.heard: list[Any] = []
+        self.detail = next(stage for stage in self.stages if isinstance(stage, DetailStage))
+
+    def look(self, changes: Changes = NOTHING, moving: bool = False, job: Job | None = None) -> Any:
+        frame = Frame(self.scene, self.view, None, moving=moving)
+        self.heard = []
+        return self.pipeline.update(frame, changes, job or Job("test", on_publish=self.heard.append))
+
+    @property
+    def truth(self) -> Picture:
+        return Picture([*from_scratch(self.scene, self.view), DetailStage.most])
+
+
+def test_rounds_go_on_until_the_stage_is_content_and_each_is_shown() -> None:
+    bench = Looked()
+    last = bench.look()
+    assert last == bench.truth
+    assert [picture[-1] for picture in bench.heard] == [0, 1, 2]
+    assert bench.pipeline.rounds == 3
+    assert {run.round for run in bench.pipeline.report} == {0, 1, 2, 3}
+    assert bench.detail.asked == 4
+    later = [(run.name, run.ran) for run in bench.pipeline.report if run.round == 2]
+    assert [name for name, ran in later if ran] == ["DetailStage", "DetailedPicture"]
+    assert bench.runs(bench.look) == []
+    assert bench.heard == []
+
+
+def test_who_moves_waits_for_no_round() -> None:
+    bench = Looked()
+    assert bench.look(moving=True)[-1] == 0
+    assert bench.detail.asked == 0
+    assert bench.look(view_changed()) == bench.truth
+    assert bench.look(bench.edit(MOVE), moving=True) == bench.truth
+    assert bench.heard == []
+
+
+def test_a_stage_that_is_never_content_is_stopped(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(DetailStage, "most", 1000)
+    bench = Looked()
+    made = bench.look()
+    assert made[-1] == bench.pipeline.rounds == MOST_ROUNDS
+    assert bench.look(view_changed(), moving=True)[-1] == MOST_ROUNDS
+
+
+def test_rounds_show_nothing_coarser_than_what_is_shown() -> None:
+    class Guessing(DetailStage):
+        def run(self, frame: Frame, inputs: Inputs, job: Job) -> Any:
+            job.publish(Detail(-1))
+            return super().run(frame, inputs, job)
+
+    bench = Looked()
+    stages = [*(stage for stage in bench.stages if not isinstance(stage, DetailStage))]
+    stages.insert(-1, Guessing())
+    bench.pipeline = Pipeline(stages)
+    assert bench.look() == bench.truth
+    assert [picture[-1] for picture in bench.heard] == [-1, 0, 1, 2]
+
+
+def test_any_change_that_concerns_a_stage_disturbs_a_round() -> None:
+    bench = Looked()
+    disturbed: list[tuple[int, bool, bool]] = []
+
+    def look(stage: Stage) -> None:
+        where = bench.pipeline.current
+        by = [bench.pipeline.dirties(view_changed(a), where) for a in (Aspect.VIEW, Aspect.NAME)]
+        disturbed.append((bench.pipeline.rounds, by[0], by[1]))
+
+    bench.detail.interrupt = look
+    bench.look()
+    assert disturbed == [(0, False, False), (1, True, False), (2, True, False), (3, True, False)]
+
+
+@settings(max_examples=150)
+@given(
+    seed=st.integers(0, 2**32),
+    plan=st.lists(
+        st.tuples(
+            st.integers(0, 2),
+            st.one_of(st.just(0), st.integers(1, 50)),
+            st.sampled_from([Cancelled, ZeroDivisionError]),
+            st.booleans(),
+        ),
+        max_size=10,
+    ),
+)
+def test_rounds_that_are_stopped_anywhere_leave_what_came_through(
+    seed: int, plan: list[tuple[int, int, type[BaseException], bool]]
+) -> None:
+    rng, serial = Random(seed), 0
+    bench = Looked()
+    for count, stop, error, moving in plan:
+        changes = NOTHING
+        for _ in range(count):
+            serial += 1
+            try:
+                changes |= bench.edit(random_edit(rng, bench.scene, serial))
+            except EditError:
+                continue
+        proven = bench.detail.proven
+        try:
+            made = bench.look(changes, moving, StoppingJob(stop, error))
+        except (Cancelled, ZeroDivisionError):
+            assert bench.detail.proven >= proven
+        else:
+            assert made == Picture([*bench.truth[:-1], proven if moving else DetailStage.most])
+        assert bench.detail.proposed is None
+    proven = bench.detail.proven
+    assert bench.look(moving=True) == Picture([*bench.truth[:-1], proven])
+    assert bench.look() == bench.truth
 
 
 def test_scenes_of_these_tests_differ_where_pictures_do() -> None:
