@@ -194,6 +194,13 @@ def refine(
     making needles. Old vertices keep their number and everything but `area`; new ones come after them,
     with `parents`. Raises ValueError when a marked pair is no edge.
     """
+    return refined(mesh, faces=faces, marked=marked)[0]
+
+
+def refined(
+    mesh: ShadingMesh, *, faces: npt.ArrayLike | None = None, marked: npt.ArrayLike | None = None
+) -> tuple[ShadingMesh, Ints]:
+    """The same, and of each new face (F,) the face of `mesh` that it is (a part of): 1 to 4, in order."""
     back = np.where(mesh.back_faces == NO_BACK, NONE, mesh.back_faces.astype(np.int64))
     weld = mesh.welded.astype(np.int64)
     points = np.zeros((int(weld.max(initial=-1)) + 1, 3))
@@ -211,8 +218,9 @@ def refine(
         slots=mesh.slots.astype(np.int64),
     )
     corners = weld[base.faces]
+    same = np.arange(len(corners))
     if not len(corners):
-        return mesh
+        return mesh, same
     around = edges(corners)
     rows = np.arange(len(corners))
     top = around.of[rows, longest(points, corners)]
@@ -227,14 +235,15 @@ def refine(
             break
         cut[needed] = True
     if not cut.any():
-        return mesh
-    made, ends = split(base, cut[around.of], np.full(corners.shape, 0.5))
+        return mesh, same
+    halves = cut[around.of]
+    made, ends = split(base, halves, np.full(corners.shape, 0.5))
     grown = _finished(made, mesh.edge, mesh.uvs is not None)
 
     def kept(old: F32, new: F32) -> F32:
         return np.concatenate([old, new[len(mesh) :]])
 
-    return dataclasses.replace(
+    result = dataclasses.replace(
         grown,
         positions=kept(mesh.positions, grown.positions),
         normals=kept(mesh.normals, grown.normals),
@@ -242,6 +251,7 @@ def refine(
         inset=kept(mesh.inset, grown.inset),
         parents=np.concatenate([mesh.parents, ends.astype(np.uint32)]),
     )
+    return result, np.repeat(same, 1 + halves.sum(axis=1))
 
 
 def _named(ends: Ints, pairs: Ints) -> Ints:

@@ -138,9 +138,26 @@ class WorldMesh:
         return dataclasses.replace(self, objects=tuple(objects), **fresh)
 
     def with_mesh(self, index: int, mesh: ShadingMesh) -> WorldMesh:
-        """With another shading mesh (a refined one) for one object; later objects' numbers shift."""
-        placed = dataclasses.replace(self.objects[index], mesh=mesh)
-        return assemble((*self.objects[:index], placed, *self.objects[index + 1 :]), self.origin)
+        """With another shading mesh (a refined one) for one object; see `with_meshes`."""
+        return self.with_meshes({index: mesh})
+
+    def with_meshes(self, meshes: Mapping[int, ShadingMesh]) -> WorldMesh:
+        """With other shading meshes for objects, by index; later objects' numbers shift.
+
+        The other objects are copied, not placed again.
+        """
+        objects = list(self.objects)
+        for index, mesh in meshes.items():
+            objects[index] = dataclasses.replace(objects[index], mesh=mesh)
+        parts = []
+        for index, placed in enumerate(objects):
+            if index in meshes:
+                parts.append(_placed(placed, self.origin))
+            else:
+                own = self.vertices_of(index)
+                arrays = (self.positions, self.normals, self.geometric, self.inset)
+                parts.append((*(array[own] for array in arrays), self.area[own]))
+        return _joined(objects, self.origin, parts)
 
 
 def world_mesh(
@@ -164,7 +181,13 @@ def world_mesh(
 def assemble(objects: Sequence[Placed], origin: npt.ArrayLike = (0.0, 0.0, 0.0)) -> WorldMesh:
     """Placed meshes concatenated."""
     centre = readonly(origin, np.float64, 3)
-    parts = [_placed(placed, centre) for placed in objects]
+    return _joined(objects, centre, [_placed(placed, centre) for placed in objects])
+
+
+def _joined(
+    objects: Sequence[Placed], origin: npt.NDArray[np.float64], parts: Sequence[tuple[F32, ...]]
+) -> WorldMesh:
+    """Placed meshes, and what `_placed` says of them, one after the other."""
     meshes = [placed.mesh for placed in objects]
     vertex = np.concatenate([[0], np.cumsum([len(mesh) for mesh in meshes])]).astype(np.int64)
     face = np.concatenate([[0], np.cumsum([len(mesh.faces) for mesh in meshes])]).astype(np.int64)
@@ -182,7 +205,7 @@ def assemble(objects: Sequence[Placed], origin: npt.ArrayLike = (0.0, 0.0, 0.0))
     uvs = [np.zeros((len(m), 2), np.float32) if m.uvs is None else m.uvs for m in meshes]
     return WorldMesh(
         objects=tuple(objects),
-        origin=centre,
+        origin=origin,
         positions=floats(0, 3),
         normals=floats(1, 3),
         geometric=floats(2, 3),
@@ -200,7 +223,7 @@ def assemble(objects: Sequence[Placed], origin: npt.ArrayLike = (0.0, 0.0, 0.0))
     )
 
 
-def _placed(placed: Placed, origin: npt.NDArray[np.float64]) -> tuple[F32, F32, F32, F32, F32]:
+def _placed(placed: Placed, origin: npt.NDArray[np.float64]) -> tuple[F32, ...]:
     """Positions, normals, geometric, inset and area of one object in the world."""
     mesh, transform = placed.mesh, placed.transform
     turn = rotation_matrix(transform.rotation).T

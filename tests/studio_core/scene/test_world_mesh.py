@@ -137,6 +137,21 @@ def test_a_refined_mesh_takes_its_place() -> None:
     assert np.array_equal(made.positions[made.vertices_of(3)], world.positions[world.vertices_of(3)])
 
 
+def test_refined_meshes_of_several_objects_take_their_places_at_once() -> None:
+    world = scene().moved(2, TURN)
+    finer = {index: refine(world.objects[index].mesh, faces=[0, 2]) for index in (2, 0)}
+    made = world.with_meshes(finer)
+    same(made, world.with_mesh(0, finer[0]).with_mesh(2, finer[2]))
+    same(made, assemble(made.objects, world.origin))
+    for index, mesh in finer.items():  # old vertices come first, unchanged
+        old, new = world.vertices_of(index), made.vertices_of(index)
+        for name in ("positions", "normals", "geometric", "inset", "uvs", "side", "material"):
+            kept = getattr(made, name)[new][: old.stop - old.start]
+            assert np.array_equal(kept, getattr(world, name)[old])
+        assert len(mesh) == new.stop - new.start
+    same(made.with_meshes({index: world.objects[index].mesh for index in finer}), world)
+
+
 def test_an_empty_world() -> None:
     world = world_mesh([], 1.0)
     assert len(world) == len(world.faces) == len(world.objects) == 0
