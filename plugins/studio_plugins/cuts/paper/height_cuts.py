@@ -12,6 +12,7 @@ a byte from the lowest (binary) or two bytes each, low byte first (valued).
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -22,7 +23,7 @@ U8 = npt.NDArray[np.uint8]
 U64 = npt.NDArray[np.uint64]
 I64 = npt.NDArray[np.int64]
 F32 = npt.NDArray[np.float32]
-Bools = npt.NDArray[np.bool_]
+Values = npt.NDArray[Any]
 
 HIGHEST_K = 15
 """A root of 2^15 leaves has the greatest height that four bits hold."""
@@ -45,7 +46,7 @@ class Cut:
 
     k: int
     heights: U8
-    values: npt.NDArray[np.uint8] | F32
+    values: Values
 
     def __len__(self) -> int:
         return len(self.heights)
@@ -64,10 +65,10 @@ class Cut:
         numbers: I64 = np.left_shift(1, self.k - heights) + (self.first_leaves >> heights)
         return numbers
 
-    def expanded(self) -> npt.NDArray[np.uint8] | F32:
+    def expanded(self) -> Values:
         """(S,) the value of every leaf."""
         spans = np.left_shift(1, self.heights.astype(np.int64))
-        leaves: npt.NDArray[np.uint8] | F32 = np.repeat(self.values, spans)
+        leaves: Values = np.repeat(self.values, spans)
         return leaves
 
 
