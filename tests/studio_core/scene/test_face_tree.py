@@ -48,8 +48,6 @@ def carried(
 def somewhere(
     rng: np.random.Generator, faces: int, count: int
 ) -> tuple[npt.NDArray[np.int32], Floats, Floats]:
-    rng: np.random.Generator, faces: int, count: int
-) -> tuple[npt.NDArray[np.int32], Floats, Floats]:
     u, v = rng.random((2, count)).astype(np.float32)
     over = u + v > 1
     return rng.integers(0, faces, count).astype(np.int32), np.where(over, 1 - u, u), np.where(over, 1 - v, v)
