@@ -1,6 +1,7 @@
 """Mitsuba 3 export: a folder that anybody can render with an independent program, to check us.
 
-scene.xml       cameras (the chosen one first), lights, materials, objects; $width $height $spp $max_depth
+scene.xml       cameras (the chosen one first), lights, materials, objects; takes $width, $height, $spp,
+                $sampler and $max_depth
 meshes/*.ply    one file a geometry and material; objects with the same mesh are instances
 env.exr         the environment, gain included; textures/ what the materials use
 bsdfs.py, emitters.py   reflectance models and lights that Mitsuba lacks, as its plugins
@@ -64,6 +65,7 @@ class MitsubaExporter:
             ("width", self.width),
             ("height", self.height),
             ("spp", self.spp),
+            ("sampler", "independent"),
             ("max_depth", self.max_depth),
         ):
             root.append(Element("default", name=name, value=str(value)))

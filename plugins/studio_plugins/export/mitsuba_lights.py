@@ -143,4 +143,4 @@ def _camera(root: Element, world: F64, fov: float) -> None:
     prop(film, "string", "pixel_format", "rgb")
     prop(film, "string", "component_format", "float32")
     put(film, "rfilter", "box")
-    prop(put(made, "sampler", "independent"), "integer", "sample_count", "$spp")
+    prop(put(made, "sampler", "$sampler"), "integer", "sample_count", "$spp")

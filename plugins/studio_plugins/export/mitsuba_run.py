@@ -7,11 +7,13 @@ from __future__ import annotations
 
 import importlib.util
 import sys
+import time
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
 from typing import Any
+from xml.etree import ElementTree
 
 import numpy as np
 import numpy.typing as npt
@@ -65,7 +67,7 @@ def _for_variant(name: str, variant: str) -> ModuleType:
 
 
 def load(folder: Path, variant: str | None = None, **values: object) -> Any:
-    """Mitsuba's scene of an exported folder; values for $width, $height, $spp, $max_depth."""
+    """Mitsuba's scene of an exported folder; values for $width, $height, $spp, $sampler, $max_depth."""
     mi = mitsuba(variant)
     return mi.load_file(str(Path(folder) / "scene.xml"), **{k: str(v) for k, v in values.items()})
 
@@ -87,6 +89,37 @@ def render(
     scene = load(folder, variant, **values)
     mi = mitsuba(variant)
     return np.array(mi.render(scene, sensor=sensor, seed=seed), np.float32)[..., :3]
+
+
+class DirectRenderer:
+    """An exported folder in Mitsuba's own `direct` integrator, loaded once: to time it at its best.
+
+    `size` is (width, height); `sampler` one of Mitsuba's, such as `multijitter` (best with square numbers
+    of samples).
+    """
+
+    def __init__(
+        self, folder: Path, size: tuple[int, int], sampler: str = "multijitter", variant: str | None = None
+    ) -> None:
+        self._mi = mitsuba(variant)
+        self._scene = load(folder, variant, width=size[0], height=size[1], sampler=sampler)
+        hidden = ElementTree.parse(Path(folder) / "scene.xml").find(
+            "integrator/boolean[@name='hide_emitters']"
+        )
+        hide = hidden is not None and hidden.get("value") == "true"
+        self._integrator = self._mi.load_dict({"type": "direct", "hide_emitters": hide})
+
+    def __call__(self, spp: int, seed: int = 0, sensor: int = 0) -> F32:
+        """(H, W, 3) linear radiance."""
+        made = self._mi.render(self._scene, sensor=sensor, integrator=self._integrator, seed=seed, spp=spp)
+        return np.array(made, np.float32)[..., :3]
+
+    def timed(self, spp: int, seed: int = 0, sensor: int = 0) -> tuple[F32, float]:
+        """The same and its seconds, by a second call: the first compiles."""
+        self(spp, seed, sensor)
+        started = time.perf_counter()
+        made = self(spp, seed, sensor)
+        return made, time.perf_counter() - started
 
 
 def vertex_irradiance(
