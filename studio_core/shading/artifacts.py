@@ -21,6 +21,7 @@ from studio_core.session import View
 if TYPE_CHECKING:
     from studio_core.kernels.light_tree import LightTree
     from studio_core.kernels.raycast import RayCaster
+    from studio_core.scene.face_tree import FaceTree
     from studio_core.scene.world_mesh import WorldMesh
 
 Source: TypeAlias = tuple[NodeId, Geometry, tuple[MaterialId, ...]]
@@ -51,7 +52,8 @@ class Surfaces:
     """What is lit: the shading meshes of all shown objects in the world, made from `sources`.
 
     `mesh.material` indexes `materials`; `opacity` is per material; `budget` is how many vertices were
-    asked for.
+    asked for. Where light needed it, objects of `mesh` are refined: their vertices and those of `base`, the
+    same without refinement, begin alike, and `tree` leads from faces of `base.mesh` to those of `mesh`.
     """
 
     sources: tuple[Source, ...]
@@ -59,6 +61,13 @@ class Surfaces:
     mesh: WorldMesh
     opacity: F32
     budget: int
+    base: Surfaces | None = None
+    tree: FaceTree | None = None
+
+    @property
+    def unrefined(self) -> Surfaces:
+        """What was refined; itself where nothing was."""
+        return self.base or self
 
     @property
     def nodes(self) -> tuple[NodeId, ...]:
@@ -74,7 +83,8 @@ class Casters:
     """Ray casters over the same objects: `shadow` knows what stops light, `primary` what is seen.
 
     Moved objects move in place, so only the newest `Casters` may be used; it is owned by the compute thread.
-    `primary` faces are those of the shading meshes. `meshes` tells whether the same meshes are meant.
+    `primary` faces are those of the unrefined shading meshes. `meshes` tells whether the same meshes are
+    meant.
     """
 
     shadow: RayCaster
