@@ -44,7 +44,7 @@ def cell_axis(face: int) -> int:
 
 @kernel
 def cell_point(face: int, column: int, row: int, m: int, out: F64) -> None:
-    """The unit direction (3,) of a cell's middle; columns run along the next axis, rows along the one after."""
+    """The unit direction (3,) of a cell's middle; columns go along the next axis, rows the one after."""
     axis = cell_axis(face)
     u = math.tan(_EIGHTH * ((2 * column + 1) / m - 1))
     v = math.tan(_EIGHTH * ((2 * row + 1) / m - 1))
