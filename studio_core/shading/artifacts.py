@@ -145,7 +145,7 @@ class Hits:
 
     `face` is an index into `mesh.faces` or -1 (nothing); barycentrics (u, v) weigh the second and third
     corner. `behind` holds what transparent surfaces in front leave to be seen: further layers, each with
-    the sample's index.
+    the sample's index. `traced` counts the rays that were needed.
     """
 
     view: View
@@ -155,6 +155,7 @@ class Hits:
     v: F32
     distance: F32
     behind: tuple[tuple[npt.NDArray[np.int64], Hits], ...] = ()
+    traced: int = 0
 
 
 @dataclass(frozen=True)
