@@ -82,13 +82,15 @@ class CasterPart:
     """One object by itself, in its own frame: three times as many rays a second as through an instance.
 
     `scene` is traced with the caster's addresses (0: it has no face that could be met). A world point x is
-    from_world @ (x, 1) in that frame, where lengths are `scale` times those of the world; in the world the
-    object lies within the sphere of `centre` and `radius`.
+    from_world @ (x, 1) in that frame, whose origin is the middle of the object's box with half extents
+    `half` (3,), and where lengths are `scale` times those of the world. In the world the object lies within
+    the sphere of `centre` and `radius`.
     """
 
     scene: int
     from_world: F64
     scale: float
+    half: F64
     centre: F64
     radius: float
 
@@ -191,10 +193,11 @@ class RayCaster:
         scale = float(np.cbrt(abs(np.linalg.det(linear))))
         centre = linear @ shared.middle + transform[:3, 3]
         if shared.alone is None or self._placed(index) is None:
-            return CasterPart(0, np.eye(4)[:3], 1.0, centre, 0.0)
+            return CasterPart(0, np.eye(4)[:3], 1.0, np.zeros(3), centre, 0.0)
         inverse = np.linalg.inv(linear)
         from_world = np.column_stack([inverse, -inverse @ centre])
-        return CasterPart(shared.alone.pointer, from_world, 1 / scale, centre, shared.radius * scale)
+        radius = shared.radius * scale
+        return CasterPart(shared.alone.pointer, from_world, 1 / scale, shared.half, centre, radius)
 
     def occluded(
         self,
