@@ -29,7 +29,6 @@ SMALLEST, LARGEST = 10, 17
 _ONE, _TWO, _HALF = np.float32(1), np.float32(2), np.float32(0.5)
 _EIGHTH_TURN = np.float32(math.pi / 4)
 _FOUR_OVER_PI = np.float32(4 / math.pi)
-_TINY = np.float32(1e-30)
 
 
 @kernel
@@ -67,7 +66,7 @@ def direction_at(hemisphere: int, s: np.float32, t: np.float32) -> tuple[np.floa
     square = r * r
     lift = np.float32(math.sqrt(_TWO - square)) * r
     y = _ONE - square
-    x, z = (cosine, sine) if first else (sine, cosine)
+    x, z = cosine if first else sine, sine if first else cosine
     return lift * x, y if hemisphere == 0 else -y, lift * z
 
 
@@ -76,15 +75,11 @@ def square_of(x: np.float32, y: np.float32, z: np.float32) -> tuple[int, np.floa
     """Hemisphere and point (s, t) in [0, 1]² of a unit direction: the inverse of `direction_at`."""
     around = x * x + z * z
     r = np.float32(math.sqrt(around / (_ONE + abs(y))))
-    if abs(x) > abs(z):
-        a = r if x > 0 else -r
-        b = a * _FOUR_OVER_PI * arctangent(z / x)
-    elif around > _TINY:
-        b = r if z > 0 else -r
-        a = b * _FOUR_OVER_PI * arctangent(x / z)
-    else:
-        a, b = np.float32(0), np.float32(0)
-    return (0 if y >= 0 else 1), _HALF * (a + _ONE), _HALF * (b + _ONE)
+    first = abs(x) > abs(z)  # no branches: loops over many points become vector code
+    larger, smaller = x if first else z, z if first else x
+    c = r if larger > 0 else -r
+    d = c * _FOUR_OVER_PI * arctangent(smaller / (larger if larger != 0 else _ONE))
+    return (0 if y >= 0 else 1), _HALF * ((c if first else d) + _ONE), _HALF * ((d if first else c) + _ONE)
 
 
 @kernel
@@ -109,7 +104,7 @@ def _gather(bits: int) -> int:
 @kernel
 def leaf_of_cell(hemisphere: int, column: int, row: int, k: int) -> int:
     """Leaf number of a cell; columns count along s, of which there are 2^(k/2), rows along t."""
-    if k % 2 == 1:
+    if k & 1:
         return (hemisphere << (k - 1)) | (_spread(column) << 1) | _spread(row)
     return (hemisphere << (k - 1)) | _spread(column) | (_spread(row) << 1)
 

@@ -1,14 +1,9 @@
-"""Environment light on the tree of directions: integrated over leaves, summed over nodes and ranges.
-
-An environment is an equirectangular map of radiance; between pixel centres it is bilinear (wrapping in
-u, clamped at the poles, centres at half integers), as in OpenEXR's lat-long maps and Mitsuba's
-`envmap`. Leaves hold its mean over their cell, never a point sample: a sun inside one cell is kept.
-"""
+"""Environment light on the tree of directions: turned, summed over nodes and ranges of leaves."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 import numpy.typing as npt
@@ -16,289 +11,157 @@ import numpy.typing as npt
 from studio_core.colour import LUMINANCE
 from studio_core.errors import InputError
 from studio_core.jit import kernel
-from studio_core.kernels.directions import arctangent, cell_of_leaf, direction_at, direction_set, leaf_of
-from studio_core.parallel import Checkpoints, Workers
+from studio_core.kernels.directions import cell_of_leaf, direction_at, direction_set, leaf_of_cell, square_of
+from studio_core.kernels.environment import checked_rotation, scaled_to
+from studio_core.parallel import Body, Checkpoints, Workers
 
 F32 = npt.NDArray[np.float32]
 F64 = npt.NDArray[np.float64]
-Colour = tuple[np.float32, np.float32, np.float32]
 
-PIXELS_PER_LEAF = 4.0
-"""Maps with more pixels across a leaf are averaged down first."""
-SAMPLES_PER_PIXEL = 6.0
-_STRETCH = 1.5  # by how much the concentric map lengthens a cell's side at most, about
-_PI = np.float32(math.pi)
-_INVERSE_TURN = np.float32(0.5 / math.pi)
-_INVERSE_PI = np.float32(1 / math.pi)
-_QUARTER_TURN = np.float32(math.pi / 2)
-_ONE, _HALF = np.float32(1), np.float32(0.5)
-
-
-@kernel
-def _box_rows(pixels: F32, out: F32, start: int, stop: int) -> None:
-    """Rows start … stop of a smaller map: means of `pixels` weighted by solid angle."""
-    height, width = pixels.shape[0], pixels.shape[1]
-    rows, columns = out.shape[0], out.shape[1]
-    tall, wide = height / rows, width / columns
-    for row in range(start, stop):
-        top, bottom = row * tall, (row + 1) * tall
-        for column in range(columns):
-            left, right = column * wide, (column + 1) * wide
-            red, green, blue, total = 0.0, 0.0, 0.0, 0.0
-            for y in range(int(top), min(height, math.ceil(bottom - 1e-9))):
-                upper, lower = max(top, float(y)), min(bottom, y + 1.0)
-                across = math.cos(math.pi * upper / height) - math.cos(math.pi * lower / height)
-                for x in range(int(left), min(width, math.ceil(right - 1e-9))):
-                    weight = across * (min(right, x + 1.0) - max(left, float(x)))
-                    red += weight * pixels[y, x, 0]
-                    green += weight * pixels[y, x, 1]
-                    blue += weight * pixels[y, x, 2]
-                    total += weight
-            out[row, column, 0] = red / total
-            out[row, column, 1] = green / total
-            out[row, column, 2] = blue / total
-
-
-@kernel
-def _widen_rows(pixels: F32, out: F32, start: int, stop: int) -> None:
-    """Rows start … stop averaged along u until a pixel is two thirds as wide as it is high.
-
-    Near the poles pixels are slivers that a grid of samples would miss; a row keeps its sum. The first
-    and the last row become constant.
-    """
-    height, width = pixels.shape[0], pixels.shape[1]
-    for row in range(start, stop):
-        sine = math.sin(math.pi * (row + 0.5) / height)
-        span = min(float(width), height / (0.75 * width * sine))
-        if row == 0 or row == height - 1:
-            span = float(width)
-        if span <= 1.0 + 1e-9:
-            out[row] = pixels[row]
-            continue
-        reach = math.ceil((span - 1.0) / 2 - 1e-9)
-        edge = (span - 1.0) / 2 - (reach - 1)
-        if 2 * reach + 1 > width:
-            reach, edge = width // 2, (1.0 if width % 2 == 1 else 0.5)
-        for channel in range(3):
-            inner = 0.0
-            for x in range(-reach + 1, reach):
-                inner += pixels[row, x % width, channel]
-            for x in range(width):
-                ends = np.float64(pixels[row, (x - reach) % width, channel])
-                ends += pixels[row, (x + reach) % width, channel]
-                out[row, x, channel] = (inner + edge * ends) / (2 * reach - 1 + 2 * edge)
-                inner += pixels[row, (x + reach) % width, channel]
-                inner -= pixels[row, (x - reach + 1) % width, channel]
-
-
-@kernel
-def angle_of(y: np.float32, x: np.float32) -> np.float32:
-    """atan2(y, x) within 3e-7; 0 at the origin."""
-    tall = abs(y) > abs(x)
-    larger = y if tall else x
-    angle = arctangent((x if tall else y) / (larger if larger != 0 else _ONE))
-    if tall:
-        return (_QUARTER_TURN if y > 0 else -_QUARTER_TURN) - angle
-    if x < 0:
-        return angle + (_PI if y >= 0 else -_PI)
-    return angle
-
-
-@kernel
-def padded_map(pixels: F32) -> F32:
-    """The map (H + 2, W + 2, 3) with one more pixel all around: wrapped in u, repeated at the poles."""
-    height, width = pixels.shape[0], pixels.shape[1]
-    out = np.empty((height + 2, width + 2, 3), np.float32)
-    for row in range(height + 2):
-        line = pixels[min(max(row - 1, 0), height - 1)]
-        out[row, 1 : width + 1] = line
-        out[row, 0] = line[width - 1]
-        out[row, width + 1] = line[0]
-    return out
-
-
-@kernel
-def bilinear(padded: F32, x: np.float32, y: np.float32, z: np.float32) -> Colour:
-    """Radiance of a `padded_map` in direction (x, y, z) of the environment's own frame."""
-    height, width = padded.shape[0] - 2, padded.shape[1] - 2
-    around = np.float32(math.sqrt(x * x + z * z))
-    u = (_HALF - angle_of(x, z) * _INVERSE_TURN) * np.float32(width) + _HALF
-    v = angle_of(around, y) * _INVERSE_PI * np.float32(height) + _HALF
-    column, row = min(max(int(u), 0), width), min(max(int(v), 0), height)
-    fu, fv = u - np.float32(column), v - np.float32(row)
-    a, b = (_ONE - fu) * (_ONE - fv), fu * (_ONE - fv)
-    c, d = (_ONE - fu) * fv, fu * fv
-    upper, lower = padded[row], padded[row + 1]
-    return (
-        a * upper[column, 0] + b * upper[column + 1, 0] + c * lower[column, 0] + d * lower[column + 1, 0],
-        a * upper[column, 1] + b * upper[column + 1, 1] + c * lower[column, 1] + d * lower[column + 1, 1],
-        a * upper[column, 2] + b * upper[column + 1, 2] + c * lower[column, 2] + d * lower[column + 1, 2],
-    )
-
-
-@kernel
-def _integrate(
-    padded: F32, to_environment: F32, k: int, across: int, along: int, out: F32, start: int, stop: int
-) -> None:
-    """Leaves start … stop: the mean over across × along points of each cell."""
-    columns, rows = np.float32(across << (k // 2)), np.float32(along << ((k - 1) // 2))
-    m = to_environment
-    for leaf in range(start, stop):
-        hemisphere, column, row = cell_of_leaf(leaf, k)
-        red, green, blue = 0.0, 0.0, 0.0
-        for i in range(across):
-            s = (np.float32(column * across + i) + _HALF) / columns
-            line_red, line_green, line_blue = np.float32(0), np.float32(0), np.float32(0)
-            for j in range(along):
-                t = (np.float32(row * along + j) + _HALF) / rows
-                x, y, z = direction_at(hemisphere, s, t)
-                r, g, b = bilinear(
-                    padded,
-                    m[0, 0] * x + m[0, 1] * y + m[0, 2] * z,
-                    m[1, 0] * x + m[1, 1] * y + m[1, 2] * z,
-                    m[2, 0] * x + m[2, 1] * y + m[2, 2] * z,
-                )
-                line_red += r
-                line_green += g
-                line_blue += b
-            red += np.float64(line_red)
-            green += np.float64(line_green)
-            blue += np.float64(line_blue)
-        out[leaf, 0] = red / (across * along)
-        out[leaf, 1] = green / (across * along)
-        out[leaf, 2] = blue / (across * along)
-
-
-def _checked_rotation(rotation: npt.ArrayLike) -> F64:
-    matrix = np.asarray(rotation, np.float64)
-    if matrix.shape != (3, 3) or not np.allclose(matrix @ matrix.T, np.eye(3), atol=1e-6):
-        raise InputError("the environment's rotation is not a rotation matrix")
-    return matrix
-
-
-def checked_map(pixels: npt.ArrayLike) -> F32:
-    """The map as contiguous float32 (H, W, 3); raises `InputError` when it cannot be radiance."""
-    image = np.ascontiguousarray(pixels, np.float32)
-    if image.ndim != 3 or image.shape[2] != 3 or image.shape[0] < 1 or image.shape[1] < 2:
-        raise InputError(f"an environment map has rows, columns and three colours, not {image.shape}")
-    if not np.isfinite(image.min()) or not np.isfinite(image.max()):
-        raise InputError("the environment map holds radiance that is not finite")
-    if image.min() < 0:
-        raise InputError("the environment map holds negative radiance")
-    return image
-
-
-def reduced_map(pixels: F32, k: int, workers: Workers, job: Checkpoints | None = None) -> F32:
-    """The map averaged down to what 2^k leaves need, pixels near the poles as wide as they are high.
-
-    Means are weighted by solid angle; a map that is small already keeps its size.
-    """
-    height, width = pixels.shape[:2]
-    pixel = math.sqrt(4 * math.pi / (1 << k)) / PIXELS_PER_LEAF
-    rows, columns = min(height, math.ceil(math.pi / pixel)), min(width, math.ceil(2 * math.pi / pixel))
-    small = pixels
-    if (rows, columns) != (height, width):
-        small = np.empty((rows, columns, 3), np.float32)
-        workers.run(rows, 16, lambda start, stop: _box_rows(pixels, small, start, stop), job)
-    wide = np.empty_like(small)
-    workers.run(rows, 16, lambda start, stop: _widen_rows(small, wide, start, stop), job)
-    return wide
-
-
-def map_power(pixels: F32) -> F64:
-    """∫ L dω (3,) of the bilinear map, in closed form: each row's tent integrated against sin θ."""
-    height, width = pixels.shape[:2]
-    step = math.pi / height
-    rows = np.sin(step * (np.arange(height) + 0.5)) * 2 * (1 - math.cos(step)) / step
-    rows[0] = rows[-1] = 1 - (math.sin(1.5 * step) - math.sin(0.5 * step)) / step if height > 1 else 2.0
-    sums: F64 = pixels.sum(axis=1, dtype=np.float64)
-    return np.asarray(rows @ sums * 2 * math.pi / width, np.float64)
-
-
-def _scaled_to(leaves: F32, power: F64) -> None:
-    """Scales each colour so that the leaves' power is `power`, where there is any."""
-    found = leaves.sum(axis=0, dtype=np.float64) * 4 * math.pi / len(leaves)
-    leaves *= np.where(found > 0, power / np.where(found > 0, found, 1.0), 1.0).astype(np.float32)
-
-
-def integrate_environment(
-    pixels: npt.ArrayLike, rotation: npt.ArrayLike, k: int, workers: Workers, job: Checkpoints | None = None
-) -> F32:
-    """Mean radiance (S, 3) float32 of an environment over each of the 2^k leaves.
-
-    pixels (H, W, 3): scene-linear radiance; rotation (3, 3): world from environment. Each cell is
-    summed over equal-area points a quarter to an eighth of a pixel apart, which catches a one-pixel sun
-    to 0.4 %; the sums are then scaled to the map's exact power. Constants come out exact to rounding.
-    Raises `InputError` for negative or non-finite radiance.
-    """
-    whole = checked_map(pixels)
-    image = reduced_map(whole, k, workers, job)
-    padded = padded_map(image)
-    to_environment = np.ascontiguousarray(_checked_rotation(rotation).T, np.float32)
-    height, width = image.shape[:2]
-    pixel = min(math.pi / height, 2 * math.pi / width)
-    side = math.sqrt(2 * math.pi) * _STRETCH
-    across = max(2, math.ceil(side / (1 << (k // 2)) / pixel * SAMPLES_PER_PIXEL))
-    along = max(2, math.ceil(side / (1 << ((k - 1) // 2)) / pixel * SAMPLES_PER_PIXEL))
-    out = np.empty((1 << k, 3), np.float32)
-    chunk = max(16, 65536 // (across * along))
-    workers.run(
-        len(out),
-        chunk,
-        lambda start, stop: _integrate(padded, to_environment, k, across, along, out, start, stop),
-        job,
-    )
-    _scaled_to(out, map_power(whole))
-    return out
+POINTS = 4
+"""Lookups across a leaf that is turned."""
+_SUBTREES = 64  # chunks of a build, whatever the number of threads
+_ONE, _HALF, _ZERO = np.float32(1), np.float32(0.5), np.float32(0)
+_RED, _GREEN, _BLUE = LUMINANCE
 
 
 @kernel
 def _rotate(
-    leaves: F32, from_k: int, to_environment: F32, k: int, points: int, out: F32, start: int, stop: int
+    leaves: F32, from_k: int, to_environment: F32, k: int, offsets: F32, out: F32, start: int, stop: int
 ) -> None:
-    columns, rows = np.float32(points << (k // 2)), np.float32(points << ((k - 1) // 2))
+    """Leaves start … stop: the mean over what lies at `offsets` (N, 2) of each cell."""
+    columns, rows = np.float32(1 << (k // 2)), np.float32(1 << ((k - 1) // 2))
     m = to_environment
+    xx, xy, xz = m[0, 0], m[0, 1], m[0, 2]
+    yx, yy, yz = m[1, 0], m[1, 1], m[1, 2]
+    zx, zy, zz = m[2, 0], m[2, 1], m[2, 2]
+    from_columns, from_rows = 1 << (from_k >> 1), 1 << ((from_k - 1) >> 1)
+    wide, tall = np.float32(from_columns), np.float32(from_rows)
+    points = len(offsets)
+    share = _ONE / np.float32(points)
+    across, along = offsets[:, 0].copy() / columns, offsets[:, 1].copy() / rows
+    source = np.empty(points, np.int32)
     for leaf in range(start, stop):
         hemisphere, column, row = cell_of_leaf(leaf, k)
-        red, green, blue = np.float32(0), np.float32(0), np.float32(0)
-        for i in range(points):
-            s = (np.float32(column * points + i) + _HALF) / columns
-            for j in range(points):
-                t = (np.float32(row * points + j) + _HALF) / rows
-                x, y, z = direction_at(hemisphere, s, t)
-                source = leaf_of(
-                    m[0, 0] * x + m[0, 1] * y + m[0, 2] * z,
-                    m[1, 0] * x + m[1, 1] * y + m[1, 2] * z,
-                    m[2, 0] * x + m[2, 1] * y + m[2, 2] * z,
-                    from_k,
-                )
-                red += leaves[source, 0]
-                green += leaves[source, 1]
-                blue += leaves[source, 2]
-        share = _ONE / np.float32(points * points)
+        left, top = np.float32(column) / columns, np.float32(row) / rows
+        for q in range(points):
+            x, y, z = direction_at(hemisphere, left + across[q], top + along[q])
+            ex = xx * x + xy * y + xz * z
+            ey = yx * x + yy * y + yz * z
+            ez = zx * x + zy * y + zz * z
+            half, s, t = square_of(ex, ey, ez)  # in parts: `leaf_of` is too long to be inlined
+            s_cell = min(max(int(np.int32(s * wide)), 0), from_columns - 1)
+            t_cell = min(max(int(np.int32(t * tall)), 0), from_rows - 1)
+            source[q] = leaf_of_cell(half, s_cell, t_cell, from_k)
+        red, green, blue = _ZERO, _ZERO, _ZERO
+        for q in range(points):
+            at = source[q]
+            red += leaves[at, 0]
+            green += leaves[at, 1]
+            blue += leaves[at, 2]
         out[leaf, 0], out[leaf, 1], out[leaf, 2] = red * share, green * share, blue * share
 
 
 def rotate_radiance(
     leaves: F32, rotation: npt.ArrayLike, k: int, workers: Workers, job: Checkpoints | None = None
 ) -> F32:
-    """Leaf radiance (2^k, 3) of an environment turned by `rotation`, from its own leaves (2^j, 3).
+    """Leaf radiance (2^k, 3) of an environment turned by `rotation`, from its leaves before (2^j, 3).
 
     For the time while a hand turns it: 16 lookups a leaf in milliseconds. Light moves by up to half a
-    source leaf and power is kept per colour; `integrate_environment` is exact.
+    source leaf and power is kept per colour; `EnvironmentMap.over_leaves` is exact.
     """
     from_k = len(leaves).bit_length() - 1
-    to_environment = np.ascontiguousarray(_checked_rotation(rotation).T, np.float32)
+    to_environment = np.ascontiguousarray(checked_rotation(rotation).T, np.float32)
     source = np.ascontiguousarray(leaves, np.float32)
+    grid = (np.arange(POINTS, dtype=np.float32) + _HALF) / np.float32(POINTS)
+    offsets = np.stack(np.meshgrid(grid, grid, indexing="ij"), axis=-1).reshape(-1, 2)
     out = np.empty((1 << k, 3), np.float32)
     workers.run(
         len(out),
         2048,
-        lambda start, stop: _rotate(source, from_k, to_environment, k, 4, out, start, stop),
+        lambda start, stop: _rotate(source, from_k, to_environment, k, offsets, out, start, stop),
         job,
     )
-    _scaled_to(out, source.sum(axis=0, dtype=np.float64) * 4 * math.pi / len(source))
+    scaled_to(out, source.sum(axis=0, dtype=np.float64) * 4 * math.pi / len(source))
     return out
+
+
+@kernel
+def _node_sums(
+    leaves: F32, directions: F32, sums: F32, moments: F32, roots: F64, start: int, stop: int
+) -> None:
+    """Nodes of the subtrees start … stop, added up in float64, in float32.
+
+    roots (subtrees, 15) get radiance (3), moment (3) and vector irradiance [channel, axis] (9) in float64.
+    """
+    size = len(leaves)
+    count = size // len(roots)
+    wide = np.empty((count, 6))
+    for subtree in range(start, stop):
+        vector = np.zeros(9)
+        for i in range(count):
+            leaf = subtree * count + i
+            x, y, z = (
+                np.float64(directions[leaf, 0]),
+                np.float64(directions[leaf, 1]),
+                np.float64(directions[leaf, 2]),
+            )
+            red, green, blue = (
+                np.float64(leaves[leaf, 0]),
+                np.float64(leaves[leaf, 1]),
+                np.float64(leaves[leaf, 2]),
+            )
+            light = _RED * red + _GREEN * green + _BLUE * blue
+            wide[i, 0], wide[i, 1], wide[i, 2] = red, green, blue
+            wide[i, 3], wide[i, 4], wide[i, 5] = light * x, light * y, light * z
+            vector[0] += red * x
+            vector[1] += red * y
+            vector[2] += red * z
+            vector[3] += green * x
+            vector[4] += green * y
+            vector[5] += green * z
+            vector[6] += blue * x
+            vector[7] += blue * y
+            vector[8] += blue * z
+        nodes, first = count, size + subtree * count
+        while True:
+            for i in range(nodes):
+                for c in range(3):
+                    sums[first + i, c] = wide[i, c]
+                    moments[first + i, c] = wide[i, 3 + c]
+            if nodes == 1:
+                break
+            nodes, first = nodes // 2, first // 2
+            for i in range(nodes):
+                for c in range(6):
+                    wide[i, c] = wide[2 * i, c] + wide[2 * i + 1, c]
+        roots[subtree, :6] = wide[0]
+        roots[subtree, 6:] = vector
+
+
+@kernel
+def _prefixes(
+    leaves: F32,
+    directions: F32,
+    before: F64,
+    solid_angle: float,
+    power: F64,
+    vector: F64,
+    start: int,
+    stop: int,
+) -> None:
+    """Running sums over the subtrees start … stop; before (subtrees, 12) is what lies in front of each."""
+    count = len(leaves) // len(before)
+    for subtree in range(start, stop):
+        own = before[subtree].copy()
+        for leaf in range(subtree * count, (subtree + 1) * count):
+            for c in range(3):
+                light = np.float64(leaves[leaf, c])
+                own[c] += light
+                power[leaf + 1, c] = own[c] * solid_angle
+                for a in range(3):
+                    own[3 + 3 * c + a] += light * np.float64(directions[leaf, a])
+                    vector[leaf + 1, c, a] = own[3 + 3 * c + a] * solid_angle
 
 
 @dataclass(frozen=True, eq=False)
@@ -320,6 +183,7 @@ class LightTree:
     """(S + 1, 3) sums of L·Δω over leaves before each."""
     prefix_vector: F64
     """(S + 1, 3, 3) sums of L_c·ω·Δω over leaves before each: [leaf, channel, axis]."""
+    _coarser: dict[int, LightTree] = field(default_factory=dict, repr=False)
 
     @property
     def solid_angle(self) -> float:
@@ -327,46 +191,53 @@ class LightTree:
         return 4 * math.pi / (1 << self.k)
 
     @staticmethod
-    def build(radiance: npt.ArrayLike) -> LightTree:
-        """The tree over leaf radiance (2^k, 3), finite and not negative."""
-        leaves = np.ascontiguousarray(radiance, np.float32)
+    def build(radiance: npt.ArrayLike, workers: Workers | None = None) -> LightTree:
+        """The tree over leaf radiance (2^k, 3), finite and not negative; the same with any workers."""
+        leaves = np.array(radiance, np.float32, order="C")
         size = len(leaves)
         k = size.bit_length() - 1
         if leaves.shape != (1 << k, 3):
             raise InputError(f"leaf radiance needs 2^k rows of three colours, not {leaves.shape}")
-        directions = direction_set(k)
-        if not np.isfinite(leaves).all():
+        directions = direction_set(k).directions
+        least, most = leaves.min(), leaves.max()
+        if not (np.isfinite(least) and np.isfinite(most)):
             raise InputError("the light holds radiance that is not finite")
-        if leaves.min() < 0:
+        if least < 0:
             raise InputError("the light holds negative radiance")
-        wide = leaves.astype(np.float64)
-        along = directions.directions.astype(np.float64)
-        sums, moments = np.zeros((2 * size, 3)), np.zeros((2 * size, 3))
-        sums[size:] = wide
-        moments[size:] = (wide @ np.array(LUMINANCE))[:, None] * along
-        for level in range(k - 1, -1, -1):
-            first = 1 << level
-            for table in (sums, moments):
-                np.add(
-                    table[2 * first : 4 * first : 2],
-                    table[2 * first + 1 : 4 * first : 2],
-                    table[first : 2 * first],
-                )
-        power = np.zeros((size + 1, 3))
-        np.cumsum(wide * directions.solid_angle, axis=0, out=power[1:])
-        vector = np.zeros((size + 1, 3, 3))
-        np.cumsum((wide * directions.solid_angle)[:, :, None] * along[:, None, :], axis=0, out=vector[1:])
-        arrays = (leaves.copy(), sums.astype(np.float32), moments.astype(np.float32), power, vector)
+        sums, moments = np.empty((2 * size, 3), np.float32), np.empty((2 * size, 3), np.float32)
+        roots = np.empty((_SUBTREES, 15))
+        _run(workers, lambda a, b: _node_sums(leaves, directions, sums, moments, roots, a, b))
+        sums[0] = moments[0] = 0
+        above = roots[:, :6]
+        while len(above) > 1:
+            above = above[::2] + above[1::2]
+            sums[len(above) : 2 * len(above)] = above[:, :3]
+            moments[len(above) : 2 * len(above)] = above[:, 3:]
+        before = np.zeros((_SUBTREES, 12))
+        np.cumsum(roots[:-1, [0, 1, 2, *range(6, 15)]], axis=0, out=before[1:])
+        power, vector = np.empty((size + 1, 3)), np.empty((size + 1, 3, 3))
+        power[0] = vector[0] = 0
+        angle = 4 * math.pi / size
+        _run(workers, lambda a, b: _prefixes(leaves, directions, before, angle, power, vector, a, b))
+        arrays = (leaves, sums, moments, power, vector)
         for array in arrays:
             array.flags.writeable = False
         return LightTree(k, *arrays)
 
     def coarsened(self, k: int) -> LightTree:
-        """The tree over 2^k fewer leaves: means of this one's."""
+        """The tree over 2^k fewer leaves: means of this one's. Made once and kept."""
         if not k <= self.k:
             raise ValueError(f"2^{self.k} leaves cannot be made 2^{k}")
         if k == self.k:
             return self
-        block = 1 << (self.k - k)
-        means = self.radiance.astype(np.float64).reshape(1 << k, block, 3).mean(axis=1)
-        return LightTree.build(means)
+        if k not in self._coarser:
+            share = np.float32(1 / (1 << (self.k - k)))
+            self._coarser[k] = LightTree.build(self.node_sum[1 << k : 2 << k] * share)
+        return self._coarser[k]
+
+
+def _run(workers: Workers | None, body: Body) -> None:
+    if workers is None:
+        body(0, _SUBTREES)
+    else:
+        workers.run(_SUBTREES, 4, body)

@@ -7,7 +7,8 @@ import numpy.typing as npt
 
 from studio_core.contract import Services
 from studio_core.kernels.directions import LARGEST
-from studio_core.kernels.light_tree import LightTree, integrate_environment
+from studio_core.kernels.environment import integrate_environment
+from studio_core.kernels.light_tree import LightTree
 from studio_core.scene.diff import Aspect
 from studio_core.scene.nodes import Environment
 from studio_core.shading.artifacts import Lighting
