@@ -1,30 +1,40 @@
 """Cut nodes of shading points: the light that arrives, as a few directions with an irradiance each.
 
 Equation (3) of Iwasaki et al., B(x, ω_o) ≈ Σ_k l_k v_k f_r(ω_k, ω_o): node k of a point is the direction
-ω_k in the point's shading frame and l_k v_k, what it adds to the irradiance. Both paths make them, the
-exact one and the paper's; only the sum over BRDFs follows.
+ω_k in the point's shading frame and l_k v_k, what it adds to the irradiance. The exact path, the paper's
+and traced lamps all make them; only the sum over BRDFs follows.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
+from studio_core.parallel import Workers
+from studio_core.shading.artifacts import ShadingPoints, Shapes
+from studio_core.shading.job import Job
+from studio_plugins.cuts.shade import node_terms
+
 F32 = npt.NDArray[np.float32]
+I32 = npt.NDArray[np.int32]
 I64 = npt.NDArray[np.int64]
+Bools = npt.NDArray[np.bool_]
 
 FLOATS = 6  # a node: x, y, z, red, green, blue
+NO_BLOCK = -1
+_BLOCKS_A_CHUNK = 2
 
 
 @dataclass(frozen=True)
 class NodeBlock:
     """The nodes of some points, as BRDF kernels read them.
 
-    points (P,) rows of the mesh; first (P + 1,) number of each point's first node; data (6 N,): of a point
-    with n nodes, from 6·first: x[n], y[n], z[n] (unit, in the shading frame of `kernels.radiance.frame`),
-    red[n], green[n], blue[n] (L·V·cosθ·Δω of the node).
+    points (P,) rows of the mesh, -1 for none; first (P + 1,) number of each point's first node; data (6 N,):
+    of a point with n nodes, from 6·first: x[n], y[n], z[n] (unit, in the shading frame of
+    `kernels.radiance.frame`), red[n], green[n], blue[n] (L·V·cosθ·Δω of the node).
     """
 
     points: I64
@@ -35,3 +45,118 @@ class NodeBlock:
     def nbytes(self) -> int:
         """Bytes of all arrays."""
         return self.points.nbytes + self.first.nbytes + self.data.nbytes
+
+    @property
+    def most(self) -> int:
+        """Nodes of the point that has most."""
+        return int(np.diff(self.first).max(initial=1))
+
+
+class NodeTable:
+    """The nodes of V vertices from one light, changed in place.
+
+    irradiance (V, 3); version (V,) grows whenever a vertex gets other nodes (0: it never had any).
+    """
+
+    def __init__(self, count: int) -> None:
+        self.irradiance = np.zeros((count, 3), np.float32)
+        self.version = np.zeros(count, np.int64)
+        self.blocks: dict[int, NodeBlock] = {}
+        self._owner = np.full(count, NO_BLOCK, np.int32)
+        self._next = 0
+        self._newest = 0
+
+    def __len__(self) -> int:
+        return len(self.version)
+
+    @property
+    def newest(self) -> int:
+        """The newest version."""
+        return self._newest
+
+    def resized(self, count: int) -> NodeTable:
+        """An empty table for another number of vertices, with versions that go on from here."""
+        made = NodeTable(count)
+        made._newest, made._next = self._newest, self._next
+        return made
+
+    def renumbered(self, count: int, to: I64) -> NodeTable:
+        """For another numbering of the vertices: `to` (V,) is where each has gone, -1: it is no more."""
+        made = self.resized(count)
+        kept = np.flatnonzero(to >= 0)
+        for name in ("irradiance", "version", "_owner"):
+            getattr(made, name)[to[kept]] = getattr(self, name)[kept]
+        made.blocks = {
+            number: NodeBlock(to[block.points], block.first, block.data)
+            for number, block in self.blocks.items()
+        }
+        return made
+
+    @property
+    def nbytes(self) -> int:
+        """Of nodes and tables."""
+        own = self.irradiance.nbytes + self.version.nbytes + self._owner.nbytes
+        return own + sum(block.nbytes for block in self.blocks.values())
+
+    @property
+    def nodes(self) -> int:
+        """How many nodes the vertices have together."""
+        total = 0
+        for number, block in self.blocks.items():
+            mine = (block.points >= 0) & (self._owner[block.points] == number)
+            total += int(np.diff(block.first)[mine].sum())
+        return total
+
+    def replace(self, blocks: Sequence[NodeBlock]) -> None:
+        """Blocks that from now on have the nodes of their points; irradiance is the caller's."""
+        self._newest += 1
+        for block in blocks:
+            self._owner[block.points] = self._next
+            self.version[block.points] = self._newest
+            self.blocks[self._next] = block
+            self._next += 1
+        used = set(np.unique(self._owner).tolist())
+        self.blocks = {number: block for number, block in self.blocks.items() if number in used}
+
+    def shade(
+        self,
+        mesh: ShadingPoints,
+        shapes: Shapes,
+        eye: F32,
+        wanted: Bools,
+        out: F32,
+        workers: Workers,
+        job: Job,
+    ) -> int:
+        """Adds to terms (V, T, 3) of the wanted vertices, as seen from `eye`; how many nodes were looked at.
+
+        The eye is relative to the mesh's origin.
+        """
+        numbers = sorted(self.blocks)
+        blocks = [self.blocks[number] for number in numbers]
+        looked = np.zeros(len(blocks), np.int64)
+
+        def body(begin: int, stop: int) -> None:
+            for index in range(begin, stop):
+                block = blocks[index]
+                looked[index] = node_terms(
+                    numbers[index],
+                    block.points,
+                    block.first,
+                    block.data,
+                    self._owner,
+                    wanted,
+                    block.most,
+                    mesh.positions,
+                    mesh.normals,
+                    mesh.material,
+                    eye,
+                    shapes.address,
+                    shapes.terms,
+                    shapes.offset,
+                    shapes.data,
+                    out,
+                )
+
+        workers.run(len(blocks), _BLOCKS_A_CHUNK, body, job)
+        return int(looked.sum())

@@ -16,8 +16,6 @@ Bools = npt.NDArray[np.bool_]
 
 @kernel
 def node_terms(
-    begin: int,
-    stop: int,
     block: int,
     points: I64,
     first: I64,
@@ -35,7 +33,7 @@ def node_terms(
     shapes: F32,
     out_terms: F32,
 ) -> int:
-    """Sets terms (V, T, 3) of those of points[begin:stop] that are wanted and owned by this block.
+    """Adds to terms (V, T, 3) of those of the points that are wanted and owned by this block.
 
     T_k = Σ_n E_n b_k(ω_n, ω_o) for the nodes n of a point, of which none has over `most`; ω_o leads to the
     eye. Returns how many nodes were looked at.
@@ -44,21 +42,22 @@ def node_terms(
     wo = np.empty(3, np.float32)
     values = np.empty(out_terms.shape[1] * most, np.float32)
     looked = 0
-    for number in range(begin, stop):
+    for number in range(len(points)):
         p = points[number]
-        if owner[p] != block or not wanted[p]:
+        if p < 0 or owner[p] != block or not wanted[p]:
             continue
         count = first[number + 1] - first[number]
+        if count == 0:
+            continue
         looked += count
         m = material[p]
-        if count > 0:
-            frame(normals[p, 0], normals[p, 1], normals[p, 2], axes)
-            local_view(positions[p], eye, axes, wo)
-            base = 6 * first[number]
-            call_address(address[m], shapes[offset[m] :], wo, count, data[base:], values)
-            red = data[base + 3 * count : base + 4 * count]
-            green = data[base + 4 * count : base + 5 * count]
-            blue = data[base + 5 * count : base + 6 * count]
+        frame(normals[p, 0], normals[p, 1], normals[p, 2], axes)
+        local_view(positions[p], eye, axes, wo)
+        base = 6 * first[number]
+        call_address(address[m], shapes[offset[m] :], wo, count, data[base:], values)
+        red = data[base + 3 * count : base + 4 * count]
+        green = data[base + 4 * count : base + 5 * count]
+        blue = data[base + 5 * count : base + 6 * count]
         for k in range(terms[m]):
             r, g, b = np.float32(0), np.float32(0), np.float32(0)
             for i in range(count):
@@ -66,5 +65,7 @@ def node_terms(
                 r += red[i] * value
                 g += green[i] * value
                 b += blue[i] * value
-            out_terms[p, k, 0], out_terms[p, k, 1], out_terms[p, k, 2] = r, g, b
+            out_terms[p, k, 0] += r
+            out_terms[p, k, 1] += g
+            out_terms[p, k, 2] += b
     return looked

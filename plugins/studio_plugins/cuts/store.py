@@ -51,7 +51,10 @@ class Records:
 
 
 class VisibilityStore:
-    """Visibility over 2^k leaves; see the module."""
+    """Visibility over 2^k leaves; see the module.
+
+    `generation` grows when vertices get other numbers; `gone_to` (V before,) says which, -1 for none.
+    """
 
     def __init__(self, k: int, workers: Workers) -> None:
         self.k = k
@@ -61,6 +64,8 @@ class VisibilityStore:
         self.coarse = Records(0)
         self.pool: npt.NDArray[Any] = np.zeros(1 << 16, record_type(k))
         self.used = 0
+        self.generation = 0
+        self.gone_to: I64 = np.zeros(0, np.int64)
         self._workers = workers
         self._beams = BeamTable()
         self._slot_of: dict[object, int] = {}
@@ -117,6 +122,10 @@ class VisibilityStore:
                 before, old = self._meshes[slot]
                 kept = _common(before, shape)
                 pieces.append((slice(there.start, there.start + kept), slice(old.start, old.start + kept)))
+        self.gone_to = np.full(len(self.exact.start), -1, np.int64)
+        for to, source in pieces:
+            self.gone_to[source] = np.arange(to.start, to.stop)
+        self.generation += 1
         self.exact = self.exact.carried(len(mesh), pieces)
         self.coarse = self.coarse.carried(len(mesh), pieces)
         self._meshes = meshes
@@ -165,6 +174,15 @@ class VisibilityStore:
         """Bytes of exact records and their tables."""
         live = int(self.exact.length.sum()) * self.pool.itemsize
         return live + 16 * len(self.exact.start)
+
+    @property
+    def stamp(self) -> int:
+        """Grows with every record that is written."""
+        return self._stamp
+
+    def seen(self, points: Points) -> Bools:
+        """Which of the points have a record, exact or coarse, of what is now or was."""
+        return np.asarray((self.exact.epoch[points] != NEVER) | (self.coarse.epoch[points] == self._now))
 
     @property
     def known(self) -> int:

@@ -1,0 +1,62 @@
+"""`cuts`: the engine of the studio (Iwasaki et al., section V, and what goes beyond it)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from studio_core.contract import Services
+from studio_core.params import param
+from studio_core.shading.stages import Adaptive, SurfaceParams, common_stages
+from studio_plugins.cuts.quality import quality
+from studio_plugins.cuts.stages import LightStage, RadianceStage, VisibilityStage
+
+
+@dataclass(frozen=True)
+class Params(SurfaceParams):
+    """Parameters of the cuts."""
+
+    quality: float = param(
+        0.5, "Quality", "From faster to truer: how far sums and shading meshes are refined", low=0.0, high=1.0
+    )
+    refine: bool = param(
+        True, "Refine at rest", "Split the shading mesh where shadows and highlights need it"
+    )
+    directions: str = param(
+        "32768",
+        "Directions",
+        "How many directions light comes from; more shows sharper shadows",
+        choices=tuple(str(1 << level) for level in range(10, 18)),
+        advanced=True,
+    )
+    lamp_samples: int = param(
+        64, "Lamp samples", "Shadow rays to an area lamp", low=1, high=256, advanced=True
+    )
+    everywhere: bool = param(
+        False, "Hidden places too", "Also light what the camera does not see", advanced=True
+    )
+
+
+def _adaptive(params: Params) -> Adaptive | None:
+    return Adaptive(target=quality(params.quality).picture) if params.refine else None
+
+
+class Cuts:
+    """See the module; satisfies `studio_core.contract.ShadingBackend`."""
+
+    id = "cuts"
+    label = "Cuts (fast)"
+    Params = Params
+
+    def stages(self, services: Services) -> Sequence[Any]:
+        """Fresh stages, the last gives Radiance."""
+        return [
+            *common_stages(services, _adaptive),
+            VisibilityStage(services),
+            LightStage(services),
+            RadianceStage(services),
+        ]
+
+
+BACKEND = Cuts()

@@ -1,0 +1,346 @@
+"""The stages of the cuts: who is seen, what it sees, which light reaches it, what of that goes to the eye.
+
+Each redoes only what its own inputs touch. What they know lies in tables that they own and change in
+place; the artifacts handed on are small and new whenever something in those tables has changed.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from studio_core.contract import Services
+from studio_core.kernels.light_tree import LightTree
+from studio_core.scene.diff import Aspect
+from studio_core.scene.nodes import NodeId
+from studio_core.scene.transform import Transform
+from studio_core.shading.artifacts import (
+    TERMS,
+    Casters,
+    Hits,
+    LayerRadiance,
+    Lighting,
+    Radiance,
+    Shapes,
+    Surfaces,
+)
+from studio_core.shading.frame import Frame
+from studio_core.shading.job import Job
+from studio_core.shading.pipeline import Inputs
+from studio_core.shading.primary import visible_vertices
+from studio_plugins.cuts.lamps import LampCache, Source, lamp_source, sphere
+from studio_plugins.cuts.light_cache import LightCache
+from studio_plugins.cuts.lobes import LobeTable
+from studio_plugins.cuts.nodes import NodeTable
+from studio_plugins.cuts.quality import Quality, quality
+from studio_plugins.cuts.store import VisibilityStore
+
+F32 = npt.NDArray[np.float32]
+I64 = npt.NDArray[np.int64]
+Bools = npt.NDArray[np.bool_]
+
+FIRST_LEVELS = (10, 12)
+"""Fineness of the first pictures of a scene of which nothing is known."""
+SLOW, QUICK = 0.07, 0.015
+"""Seconds of a preview after which the next is coarser, or finer."""
+
+
+@dataclass(frozen=True, eq=False)
+class Seen:
+    """Which vertices are to be lit, and the store of what they see, at one moment."""
+
+    store: VisibilityStore
+    points: I64
+    mask: Bools
+    exact: bool
+    level: int
+
+
+class VisibilityStage:
+    """Traces what is not known, coarsely while somebody moves something."""
+
+    needs: tuple[type, ...] = (Surfaces, Casters, Hits)
+    gives = Seen
+    dirtied_by = Aspect.VIEW | Aspect.QUALITY
+
+    def __init__(self, services: Services) -> None:
+        self._workers = services.workers
+        self._store: VisibilityStore | None = None
+        self._preview = FIRST_LEVELS[-1]
+
+    def run(self, frame: Frame, inputs: Inputs, job: Job) -> Seen:
+        """The previous where nobody sees anything else; publishes coarse steps of what is new."""
+        surfaces, hits = inputs[Surfaces], inputs[Hits]
+        k = int(frame.params.directions).bit_length() - 1
+        if self._store is None or self._store.k != k:
+            self._store = VisibilityStore(k, self._workers)
+        store = self._store
+        generation = store.generation
+        store.follow(surfaces, inputs[Casters])
+        if frame.params.everywhere:
+            mask = np.ones(len(surfaces.mesh.positions), np.bool_)
+        else:
+            mask = visible_vertices(surfaces, hits)
+        points = np.flatnonzero(mask)
+        before = store.stamp
+        if frame.moving:
+            self._look(points, job)
+        else:
+            unknown = store.unknown(points)
+            if len(unknown) and job.listened_to and not store.seen(unknown).any():
+                for level in FIRST_LEVELS:
+                    if level < k:
+                        store.preview(points, level, job)
+                        job.publish(Seen(store, points, mask, False, level))
+            store.trace(points, job)
+        exact = not len(store.unknown(points))
+        previous: Seen | None = inputs.previous
+        if (
+            previous is not None
+            and store.generation == generation
+            and store.stamp == before
+            and previous.store is store
+            and previous.exact == exact
+            and np.array_equal(previous.mask, mask)
+        ):
+            return previous
+        return Seen(store, points, mask, exact, k if exact else self._preview)
+
+    def _look(self, points: I64, job: Job) -> None:
+        assert self._store is not None
+        started = time.perf_counter()
+        self._store.preview(points, self._preview, job)
+        taken = time.perf_counter() - started
+        if taken > SLOW:
+            self._preview = max(self._preview - 1, FIRST_LEVELS[0])
+        elif taken < QUICK:
+            self._preview = min(self._preview + 1, FIRST_LEVELS[-1])
+
+
+@dataclass(frozen=True, eq=False)
+class Arriving:
+    """The light of every layer at the vertices: tables of nodes, which change in place."""
+
+    layers: tuple[tuple[NodeId, tuple[NodeTable, ...]], ...]
+    summed: int
+    lamp_points: int
+
+
+class LightStage:
+    """Gathers the environment's light over what vertices see, and looks at lamps and suns."""
+
+    needs: tuple[type, ...] = (Surfaces, Casters, Shapes, Lighting, Seen)
+    gives = Arriving
+    dirtied_by = Aspect.QUALITY | Aspect.VIEW
+
+    def __init__(self, services: Services) -> None:
+        self._workers = services.workers
+        self._environment = LightCache(services.workers)
+        self._lamps: dict[NodeId, LampCache] = {}
+        self._lobes = LobeTable()
+        self._placed: dict[NodeId, tuple[object, Transform]] = {}
+        self._spheres: dict[NodeId, tuple[npt.NDArray[np.float64], float]] = {}
+
+    def run(self, frame: Frame, inputs: Inputs, job: Job) -> Arriving:
+        """The previous where no vertex gets other light."""
+        surfaces, lighting, seen = inputs[Surfaces], inputs[Lighting], inputs[Seen]
+        mesh = surfaces.mesh
+        wanted = quality(frame.params.quality)
+        lobes = self._lobes(inputs[Shapes])
+        by_material = np.array([not lobe.flat for lobe in lobes] + [False], np.bool_)
+        glossy = by_material[mesh.material]
+        layers: list[tuple[NodeId, tuple[NodeTable, ...]]] = []
+        summed = looked = 0
+        before = [table.newest for _, tables in self._tables() for table in tables]
+        if lighting.environment is not None and lighting.tree is not None:
+            tree = fitted(lighting.tree, seen.store.k)
+            self._environment.follow(seen.store, tree, wanted.tolerance)
+            summed = self._environment.gather(seen.store, mesh, seen.points, glossy, job)
+        shadows = self._moved(surfaces, inputs[Casters])
+        sources = self._sources(lighting, frame, wanted)
+        self._lamps = {node: self._lamps.get(node) or LampCache(self._workers) for node in sources}
+        for node, (source, coarse) in sources.items():
+            cache = self._lamps[node]
+            cache.follow(source, seen.store)
+            for index, spheres in shadows:
+                if index is not None:
+                    cache.forget(mesh.vertices_of(index))
+                for middle, radius in spheres:
+                    cache.forget(cache.shadowed_by(mesh.positions + mesh.origin, middle, radius))
+            looked += cache.gather(
+                mesh,
+                inputs[Casters].shadow,
+                seen.points,
+                glossy,
+                coarse if frame.moving else None,
+                job,
+            )
+        layers = self._tables(lighting)
+        after = [table.newest for _, tables in layers for table in tables]
+        previous: Arriving | None = inputs.previous
+        if previous is not None and before == after and _same(previous.layers, layers) and not summed:
+            return previous
+        return Arriving(tuple(layers), summed, looked)
+
+    def _tables(self, lighting: Lighting | None = None) -> list[tuple[NodeId, tuple[NodeTable, ...]]]:
+        made: list[tuple[NodeId, tuple[NodeTable, ...]]] = []
+        if lighting is None:
+            return [("", (self._environment.table, *(cache.table for cache in self._lamps.values())))]
+        if lighting.environment is not None:
+            node = lighting.environment.id
+            suns = (self._lamps[node].table,) if node in self._lamps else ()
+            made.append((node, (self._environment.table, *suns)))
+        made.extend((lamp.node, (self._lamps[lamp.node].table,)) for lamp in lighting.lamps)
+        return made
+
+    def _sources(
+        self, lighting: Lighting, frame: Frame, wanted: Quality
+    ) -> dict[NodeId, tuple[Source, Source | None]]:
+        """Every lamp, and the suns under the environment's name, exact and as while something moves."""
+        made: dict[NodeId, tuple[Source, Source | None]] = {}
+        sun = getattr(lighting, "sun", None)
+        if lighting.environment is not None and sun is not None and len(sun.directions):
+            ends = np.column_stack([sun.directions, np.zeros(len(sun.directions))])
+            made[lighting.environment.id] = (Source(ends, None, np.asarray(sun.irradiance, np.float32)), None)
+        for lamp in lighting.lamps:
+            exact = lamp_source(lamp, frame.params.lamp_samples)
+            coarse = lamp_source(lamp, min(wanted.moving_lamp_samples, frame.params.lamp_samples))
+            made[lamp.node] = (exact, coarse if len(coarse.targets) < len(exact.targets) else None)
+        return made
+
+    def _moved(
+        self, surfaces: Surfaces, casters: Casters
+    ) -> list[tuple[int | None, list[tuple[npt.NDArray[np.float64], float]]]]:
+        """Objects that moved, came or went: index now (None: gone), and spheres they were and are in."""
+        now: dict[NodeId, tuple[object, Transform]] = {}
+        spheres: dict[NodeId, tuple[npt.NDArray[np.float64], float]] = {}
+        made: list[tuple[int | None, list[tuple[npt.NDArray[np.float64], float]]]] = []
+        for index, node in enumerate(surfaces.nodes):
+            stops = casters.meshes[index][1]  # type: ignore[index]
+            now[node] = ((surfaces.sources[index][1].key, stops), casters.transforms[index])
+            if self._placed.get(node) == now[node]:
+                spheres[node] = self._spheres[node]
+                continue
+            spheres[node] = sphere(surfaces.mesh, index)
+            old = [self._spheres[node]] if node in self._spheres else []
+            made.append((index, [*old, spheres[node]]))
+        made.extend((None, [self._spheres[node]]) for node in self._placed if node not in now)
+        if not self._placed:
+            made = []  # nothing was looked at yet
+        self._placed, self._spheres = now, spheres
+        return made
+
+
+def fitted(tree: LightTree, k: int) -> LightTree:
+    """The tree over 2^k leaves; of a coarser one every leaf is repeated."""
+    if tree.k >= k:
+        return tree.coarsened(k)
+    return LightTree.build(np.repeat(tree.radiance, 1 << (k - tree.k), axis=0))
+
+
+def _same(a: Sequence[tuple[NodeId, Any]], b: Sequence[tuple[NodeId, Any]]) -> bool:
+    return [node for node, _ in a] == [node for node, _ in b] and all(
+        one is other for (_, s), (_, t) in zip(a, b, strict=True) for one, other in zip(s, t, strict=True)
+    )
+
+
+@dataclass
+class _Layer:
+    """What was last handed on for a layer, and from which nodes."""
+
+    radiance: LayerRadiance
+    version: list[I64] = field(default_factory=list)
+
+
+class RadianceStage:
+    """Sums BRDFs over nodes, for the vertices where nodes, material or eye are others than before."""
+
+    needs: tuple[type, ...] = (Surfaces, Shapes, Lighting, Hits, Seen, Arriving)
+    gives = Radiance
+    dirtied_by = Aspect.VIEW | Aspect.QUALITY
+
+    def __init__(self, services: Services) -> None:
+        self._workers = services.workers
+        self._layers: dict[NodeId, _Layer] = {}
+        self._eye: tuple[float, ...] = ()
+        self._shapes: list[tuple[int, bytes]] = []
+        self._material: npt.NDArray[np.int32] = np.zeros(0, np.int32)
+
+    def run(self, frame: Frame, inputs: Inputs, job: Job) -> Radiance:
+        """Radiance of all layers; vertices that are not seen have none."""
+        surfaces, shapes, seen = inputs[Surfaces], inputs[Shapes], inputs[Seen]
+        mesh, arriving = surfaces.mesh, inputs[Arriving]
+        count = len(mesh.positions)
+        eye = tuple(frame.view.transform.translation)
+        local_eye = (np.asarray(eye, np.float64) - mesh.origin).astype(np.float32)
+        moved = eye != self._eye or len(self._material) != count
+        table = _shape_table(shapes)
+        changed = _changed_materials(self._shapes, table)
+        other = np.append(changed, True)[mesh.material]
+        if len(self._material) == count:
+            other |= self._material != mesh.material
+        layers: dict[NodeId, LayerRadiance] = {}
+        kept: dict[NodeId, _Layer] = {}
+        looked = shaded = 0
+        for node, tables in arriving.layers:
+            before = self._layers.get(node)
+            versions = [table_.version.copy() for table_ in tables]
+            if before is None or moved or len(before.version) != len(versions):
+                dirty = seen.mask
+                terms = np.zeros((count, TERMS, 3), np.float32)
+                irradiance = np.zeros((count, 3), np.float32)
+            else:
+                fresh = ~other
+                for was, is_ in zip(before.version, versions, strict=True):
+                    fresh &= was == is_
+                dirty = seen.mask & ~fresh
+                if not dirty.any():
+                    layers[node], kept[node] = before.radiance, before
+                    continue
+                terms, irradiance = before.radiance.terms.copy(), before.radiance.irradiance.copy()
+                terms[dirty] = 0
+            rows = np.flatnonzero(dirty)
+            irradiance[rows] = sum((t.irradiance[rows] for t in tables), np.zeros((len(rows), 3), np.float32))
+            for nodes in tables:
+                looked += nodes.shade(mesh, shapes, local_eye, dirty, terms, self._workers, job)
+            shaded += len(rows)
+            done = [
+                np.where(dirty, v, w)
+                for v, w in zip(versions, _or_blank(before, versions, moved), strict=True)
+            ]
+            layers[node] = LayerRadiance(terms, irradiance)
+            kept[node] = _Layer(layers[node], done)
+        self._layers, self._eye, self._shapes, self._material = kept, eye, table, mesh.material
+        counts = {
+            **seen.store.summary(),
+            "vertices": count,
+            "skipped_vertices_unseen": count - len(seen.points),
+            "vertices_shaded": shaded,
+            "vertices_summed": arriving.summed,
+            "vertices_traced_to_lamps": arriving.lamp_points,
+            "nodes": looked,
+        }
+        return Radiance(surfaces, inputs[Hits], layers, seen.mask, 1 << seen.level, seen.exact, counts)
+
+
+def _or_blank(before: _Layer | None, versions: list[I64], moved: bool) -> list[I64]:
+    if before is None or moved or len(before.version) != len(versions):
+        return [np.full_like(version, -1) for version in versions]
+    return before.version
+
+
+def _shape_table(shapes: Shapes) -> list[tuple[int, bytes]]:
+    bounds = np.append(shapes.offset, len(shapes.data))
+    return [
+        (int(shapes.address[m]), shapes.data[bounds[m] : bounds[m + 1]].tobytes())
+        for m in range(len(shapes.address))
+    ]
+
+
+def _changed_materials(before: list[tuple[int, bytes]], now: list[tuple[int, bytes]]) -> Bools:
+    return np.array([m >= len(before) or before[m] != shape for m, shape in enumerate(now)], np.bool_)
