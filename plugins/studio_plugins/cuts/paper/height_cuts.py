@@ -34,6 +34,7 @@ _DE_BRUIJN = np.uint64(0x03F79D71B4CB0A89)
 _INDEX_OF = np.zeros(64, np.uint8)
 for _index in range(64):
     _INDEX_OF[((0x03F79D71B4CB0A89 << _index) & 0xFFFFFFFFFFFFFFFF) >> 58] = _index
+_LOGARITHM = np.array([0, *(int(n).bit_length() - 1 for n in range(1, 256))], np.uint8)
 _ALL = np.uint64(0xFFFFFFFFFFFFFFFF)
 
 
@@ -80,12 +81,11 @@ def trailing_zeros(word: np.uint64) -> int:
 
 
 @kernel
-def aligned_height(start: int, stop: int, k: int) -> int:
+def aligned_height(start: int, stop: int) -> int:
     """Height of the greatest node that begins at leaf `start` and ends at `stop` or before."""
-    height = k if start == 0 else trailing_zeros(np.uint64(start))
-    while start + (1 << height) > stop:
-        height -= 1
-    return height
+    span = stop - start
+    room = int(_LOGARITHM[span]) if span < 256 else 8 + int(_LOGARITHM[span >> 8])
+    return room if start == 0 else min(room, trailing_zeros(np.uint64(start)))
 
 
 @kernel
@@ -103,7 +103,7 @@ def next_change(words: U64, start: int, bit: int) -> int:
 
 
 @kernel
-def cut_of_bits(words: U64, k: int, heights: U8, values: U8) -> int:
+def cut_of_bits(words: U64, heights: U8, values: U8) -> int:
     """The binary cut of visibility words (S / 64,): children merge only when they are equal (V.A.1).
 
     Fills heights and values and returns how many nodes there are; up to S fit.
@@ -113,7 +113,7 @@ def cut_of_bits(words: U64, k: int, heights: U8, values: U8) -> int:
         bit = int((words[start >> 6] >> np.uint64(start & 63)) & np.uint64(1))
         stop = next_change(words, start, bit)
         while start < stop:
-            height = aligned_height(start, stop, k)
+            height = aligned_height(start, stop)
             heights[count], values[count] = height, bit
             count += 1
             start += 1 << height
@@ -218,7 +218,7 @@ def binary_cut(visible: npt.ArrayLike) -> Cut:
     k = _power_of(leaves.shape)
     words = np.packbits(leaves, bitorder="little").view(np.uint64)
     heights, values = np.empty(len(leaves), np.uint8), np.empty(len(leaves), np.uint8)
-    count = cut_of_bits(words, k, heights, values)
+    count = cut_of_bits(words, heights, values)
     return Cut(k, heights[:count].copy(), values[:count].copy())
 
 

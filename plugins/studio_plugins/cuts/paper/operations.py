@@ -85,15 +85,14 @@ def add_changes(record: U8, at: int, count: int, weight: int, differences: I32, 
 
     differences (S + 64,) and changed (S / 64 + 1,), a bit a leaf, are all zero before the first cut.
     """
-    leaf, before = 0, 1
-    for item in range(count):
-        bit = bit_at(record, at, count, item)
-        if bit != before:
-            differences[leaf] += weight if bit == 0 else -weight
-            changed[leaf >> 6] |= np.uint64(1) << np.uint64(leaf & 63)
-            before = bit
+    leaf, before = 0, 0
+    for item in range(count):  # without branches: runs are too short to predict
+        hidden = 1 - bit_at(record, at, count, item)
+        differences[leaf] += weight * (hidden - before)
+        changed[leaf >> 6] |= np.uint64(hidden ^ before) << np.uint64(leaf & 63)
+        before = hidden
         leaf += 1 << height_at(record, at, item)
-    if before == 0:
+    if before:
         differences[leaf] -= weight
         changed[leaf >> 6] |= np.uint64(1)
 

@@ -113,7 +113,7 @@ def test_intervals_give_the_same_cut(made: tuple[Cut, list[tuple[list[Cut], list
         while start < stop:
             end = next_boundary(boundaries, start, stop)
             while start < end:
-                span = aligned_height(start, end, valued.k)
+                span = aligned_height(start, end)
                 found.append((span, float(np.float32(value) * product[start])))
                 start += 1 << span
     expected = counted(PRODUCT, factors)
