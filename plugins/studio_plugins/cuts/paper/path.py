@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import dataclasses
 import time
-from collections.abc import Hashable, Sequence
+from collections.abc import Hashable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,6 +25,7 @@ from studio_core.scene.world_mesh import WorldMesh
 from studio_plugins.cuts.nodes import FLOATS, NodeBlock
 from studio_plugins.cuts.paper import placement
 from studio_plugins.cuts.paper.height_cuts import HIGHEST_K
+from studio_plugins.cuts.paper.kept_products import KeptProducts
 from studio_plugins.cuts.paper.placement import Placement, touch
 from studio_plugins.cuts.paper.product import multiply, multiply_by_counters
 from studio_plugins.cuts.paper.records import CutSizes
@@ -44,7 +45,7 @@ BLOCK = 1024
 """Receivers in a block of nodes."""
 
 
-@dataclass
+@dataclass(eq=False)
 class _Item:
     """One object as it is placed."""
 
@@ -54,15 +55,6 @@ class _Item:
     sphere: F64
     own: SelfVisibility
     field: VisibilityCutField
-
-
-@dataclass
-class _Block:
-    """Products of some receivers."""
-
-    numbers: npt.NDArray[np.uint16]
-    values: F32
-    live: int
 
 
 class PaperPath:
@@ -83,7 +75,7 @@ class PaperPath:
         self._mesh: WorldMesh | None = None
         self._shadow: RayCaster | None = None
         self._pending: dict[int, tuple[F64, VisibilityCutField]] = {}
-        self._forget()
+        self._products = KeptProducts(0)
         self._done = PaperCounts()
         self._seconds = dict.fromkeys(("svc", "vcf", "product", "light", "concerned"), 0.0)
 
@@ -123,29 +115,11 @@ class PaperPath:
             for index, (old, new) in enumerate(zip(before, items, strict=True)):
                 if old.field is not new.field or not np.array_equal(old.sphere, new.sphere):
                     self._pending.setdefault(index, (old.sphere, old.field))
-                    self._invalidate(np.arange(mesh.vertex_offsets[index], mesh.vertex_offsets[index + 1]))
+                    self._products.drop(np.arange(mesh.vertex_offsets[index], mesh.vertex_offsets[index + 1]))
         self._items, self._mesh, self._shadow = items, mesh, shadow
         if not same:
-            self._forget()
-
-    def _forget(self) -> None:
-        """No receiver has a product."""
-        count = 0 if self._mesh is None else len(self._mesh)
-        self._pending = {}
-        self._blocks: dict[int, _Block] = {}
-        self._next_block = 0
-        self._block_of: I64 = np.full(count, -1, np.int64)
-        self._first: I64 = np.zeros(count, np.int64)
-        self._size: I64 = np.zeros(count, np.int64)
-
-    def _invalidate(self, points: I64) -> None:
-        blocks = self._block_of[points]
-        self._block_of[points] = -1
-        numbers, lost = np.unique(blocks[blocks >= 0], return_counts=True)
-        for number, gone in zip(numbers.tolist(), lost.tolist(), strict=True):
-            self._blocks[number].live -= gone
-            if not self._blocks[number].live:
-                del self._blocks[number]
+            self._pending = {}
+            self._products = KeptProducts(len(mesh))
 
     # results
 
@@ -204,28 +178,45 @@ class PaperPath:
 
     def cut(self, point: int) -> tuple[I64, F32]:
         """Heap numbers and values v_k of the nodes of one receiver that has a product."""
-        block = self._blocks[int(self._block_of[point])]
-        part = slice(int(self._first[point]), int(self._first[point] + self._size[point]))
-        return block.numbers[part].astype(np.int64), block.values[part]
+        return self._products.cut(point)
 
-    def concerned(self) -> int:
-        """How many receivers have a product that is up to date."""
-        return int((self._block_of >= 0).sum())
+    def made(self) -> int:
+        """How many receivers have a product, as far as is known: a move may have outdated some."""
+        return len(self._products.known)
+
+    def sampled_fields(
+        self, samples: int, rng: np.random.Generator, job: Checkpoints | None = None
+    ) -> Iterator[tuple[CutSizes, int]]:
+        """Of every field, the sizes of some random samples, which are not kept, and how many it has."""
+        assert self._shadow is not None
+        seen = set()
+        for index, item in enumerate(self._items):
+            part = self._shadow.part(index)
+            if item.field in seen or not part.scene:
+                continue
+            seen.add(item.field)
+            other = VisibilityCutField(item.field.radius, self.params.shells, self.params.cells)
+            possible = len(other.table)
+            chosen = np.sort(rng.choice(possible, min(samples, possible), replace=False)).astype(np.int64)
+            occluded8 = self._shadow.handles().occluded8
+            other.trace(chosen, part, occluded8, self._directions, self._workers, job)
+            yield other.records.sizes, possible
 
     @property
     def counts(self) -> PaperCounts:
         """See `PaperCounts`."""
         owns = {id(item.own): item.own for item in self._items}.values()
         fields = {id(item.field): item.field for item in self._items}.values()
-        products = sum(b.numbers.nbytes + b.values.nbytes for b in self._blocks.values())
         return dataclasses.replace(
             self._done,
             svc=sum((own.records.sizes for own in owns), CutSizes()),
             vcf=sum((made.records.sizes for made in fields), CutSizes()),
             fields=len(fields),
             vcf_possible=sum(len(made.table) for made in fields),
-            kept_bytes=sum(own.nbytes for own in owns) + sum(made.nbytes for made in fields) + products,
-            product_nodes=int(self._size[self._block_of >= 0].sum()),
+            kept_bytes=sum(own.nbytes for own in owns)
+            + sum(made.nbytes for made in fields)
+            + self._products.nbytes,
+            product_nodes=self._products.nodes,
             seconds=dict(self._seconds),
         )
 
@@ -236,21 +227,14 @@ class PaperPath:
         if tree.k < self.params.k:
             raise ValueError(f"the light has 2^{tree.k} leaves, the cuts 2^{self.params.k}")
         self.prepare(points, job)
-        blocks = self._block_of[points]
-        last = int(blocks.max(initial=0))
-        tables = np.zeros((2, last + 1), np.int64)
-        for number in np.unique(blocks).tolist():
-            block = self._blocks[number]
-            tables[:, number] = block.numbers.ctypes.data, block.values.ctypes.data
-        first = self._first[points]
-        return tables[0, blocks] + 2 * first, tables[1, blocks] + 4 * first, self._size[points]
+        return self._products.addresses(points)
 
     def prepare(self, points: I64, job: Checkpoints | None = None) -> None:
         """Makes all cuts that `points` need; light adds little to it."""
         if self._mesh is None:
             raise ValueError("nothing is placed yet")
         self._settle(job)
-        missing = np.unique(points[self._block_of[points] < 0])
+        missing = self._products.without(points)
         if not len(missing):
             return
         self._trace_own(missing, job)
@@ -262,7 +246,7 @@ class PaperPath:
         if not self._pending:
             return
         pending = self._pending
-        known = np.flatnonzero(self._block_of >= 0)
+        known = self._products.known
         started = time.perf_counter()
         only = np.zeros(len(self._items), np.uint8)
         only[list(pending)] = 1
@@ -277,7 +261,7 @@ class PaperPath:
             alone[index] = 1
             hit[hit == 0] = self._ask(left, alone, self._placement(items), job)[1]
         self._seconds["concerned"] += time.perf_counter() - started
-        self._invalidate(known[hit == 1])
+        self._products.drop(known[hit == 1])
         self._pending = {}
 
     def _trace_own(self, points: I64, job: Checkpoints | None) -> None:
@@ -372,12 +356,7 @@ class PaperPath:
             raise RuntimeError("a sample was not traced before it was used")
         for start in sorted(made):
             numbers, values, sizes = made[start]
-            rows = points[start : start + len(sizes)]
-            ends = np.cumsum(sizes, dtype=np.int64)
-            self._first[rows], self._size[rows] = ends - sizes, sizes
-            self._block_of[rows] = self._next_block
-            self._blocks[self._next_block] = _Block(numbers, values, len(rows))
-            self._next_block += 1
+            self._products.put(points[start : start + len(sizes)], sizes, numbers, values)
         total = counts.sum(axis=0)
         self._done = dataclasses.replace(
             self._done,

@@ -9,8 +9,10 @@ Cells lie along the axes of the world, so that a field only shifts with its obje
 Interpolation (V.A.4) is linear between two spheres and bilinear between four cells of a sphere, across
 edges of the cube into the next face; at a corner of the cube, where three cells meet, their weights fill
 up for the fourth. The paper is silent about receivers nearer than 0.2 r or farther than 10 r. Nearer, the
-innermost sphere is taken in the receiver's direction. Farther, the outermost sphere is, and what it hides
-is weakened by (10 r / d)², by which the solid angle of the object shrinks.
+innermost sphere is taken in the receiver's direction (in the sample room wrong by 5 % of the unhidden
+light; taking such an object for transparent by 50 %). Farther, the outermost sphere is, and what it hides
+is weakened by (10 r / d)², by which the solid angle of the object shrinks (wrong by 0.06 %; unweakened, or
+transparent, by 0.4 %).
 """
 
 from __future__ import annotations

@@ -41,10 +41,13 @@ class Little:
 
 
 def made_of(
-    places: tuple[Transform, ...] = PLACES, see_through: tuple[int, ...] = (), edge: float = 0.3
+    places: tuple[Transform, ...] = PLACES,
+    see_through: tuple[int, ...] = (),
+    edge: float = 0.3,
+    box: Geometry | None = None,
 ) -> Little:
-    ground, box = floor(4.0), cube(0.6)
-    geometries: list[Geometry] = [ground, *([box] * (len(places) - 1))]
+    """A floor and boxes of 0.6 m, or other things, at places."""
+    geometries = [floor(4.0), *([box or cube(0.6)] * (len(places) - 1))]
     items = [(f"o{i}", g, place, [0]) for i, (g, place) in enumerate(zip(geometries, places, strict=True))]
     mesh = world_mesh(items, edge, cache=MeshCache())
     objects, identities = [], []
