@@ -40,6 +40,7 @@ class Report:
     quick: bool
     rows: list[Row] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
+    details: dict[str, Any] = field(default_factory=dict)  # by case; in the JSON alone
 
     def add(self, case: str, metric: str, value: float, unit: str, spread: float = 0.0) -> None:
         """One more figure."""
@@ -55,6 +56,7 @@ class Report:
             "quick": self.quick,
             "rows": [asdict(row) for row in self.rows],
             "notes": self.notes,
+            "details": self.details,
         }
 
     def write(self, path: Path) -> None:

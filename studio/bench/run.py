@@ -10,7 +10,7 @@ from studio.headless import Headless
 from studio_core.errors import InputError
 
 SUITES = {
-    "bench": {"reference": "studio.bench.reference"},
+    "bench": {"reference": "studio.bench.reference", "cuts": "studio.bench.cuts"},
     "stress": {"ui": "studio.bench.stress_ui"},
 }
 

@@ -37,6 +37,7 @@ def report() -> Report:
     made.add("sample", "error", np.float32(0.25), "1", 0.5)
     made.add("start", "window_s", 1, "s")
     made.notes.append("Something was left out.")
+    made.details["sample"] = {"stages": [1, 2]}
     return made
 
 
@@ -133,7 +134,7 @@ def test_the_json_has_the_promised_shape(tmp_path: Path) -> None:
     made = report()
     made.write(tmp_path / "rows.json")
     found = json.loads((tmp_path / "rows.json").read_text())
-    assert list(found) == ["suite", "version", "commit", "machine", "quick", "rows", "notes"]
+    assert list(found) == ["suite", "version", "commit", "machine", "quick", "rows", "notes", "details"]
     assert (found["suite"], found["version"], found["quick"]) == ("little", __version__, True)
     assert found["rows"] == [
         {"case": "sample", "metric": "error", "value": 0.25, "unit": "1", "spread": 0.5},
@@ -141,6 +142,7 @@ def test_the_json_has_the_promised_shape(tmp_path: Path) -> None:
     ]
     assert found["machine"]["cores"] >= 1
     assert found["notes"] == ["Something was left out."]
+    assert found["details"] == {"sample": {"stages": [1, 2]}}
 
 
 def test_the_machine_is_described_in_plain_values() -> None:
