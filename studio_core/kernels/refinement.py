@@ -1,4 +1,4 @@
-"""Where hits on a mesh lie after it was refined."""
+"""Where hits on a mesh lie after it was refined, and what old vertices tell of new ones."""
 
 from __future__ import annotations
 
@@ -9,6 +9,8 @@ from studio_core.jit import kernel
 
 F32 = npt.NDArray[np.float32]
 I32 = npt.NDArray[np.int32]
+I64 = npt.NDArray[np.int64]
+Bools = npt.NDArray[np.bool_]
 NO_PART = 2147483647
 
 
@@ -53,3 +55,28 @@ def locate(
             a, b = x, y
         found[n] = ~reference
         found_u[n], found_v[n] = np.float32(a), np.float32(b)
+
+
+@kernel
+def descend(between: I64, wanted: Bools) -> None:
+    """Of wanted vertices (V,), those that refinement made are no longer wanted, but what they lie between is.
+
+    between (V, 2): the vertices that each was put between, before it in number; twice itself for others.
+    """
+    for i in range(len(between) - 1, -1, -1):
+        if wanted[i] and between[i, 0] != between[i, 1]:
+            wanted[i] = False
+            wanted[between[i, 0]] = True
+            wanted[between[i, 1]] = True
+
+
+@kernel
+def prolong(between: I64, known: Bools, values: F32) -> None:
+    """Values (V, C) of vertices that refinement made and that are not known: the means of those between.
+
+    With all that `descend` left, it gives what the unrefined mesh would show.
+    """
+    for i in range(len(between)):
+        if not known[i] and between[i, 0] != between[i, 1]:
+            for c in range(values.shape[1]):
+                values[i, c] = np.float32(0.5) * (values[between[i, 0], c] + values[between[i, 1], c])

@@ -69,7 +69,7 @@ def seen_corners(mesh: WorldMesh, view: View, faces: I64) -> I64:
     eye = np.asarray(view.transform.translation, np.float64) - mesh.origin
     normal = np.cross(at[:, 1] - at[:, 0], at[:, 2] - at[:, 0])
     back = mesh.back_faces[faces]
-    behind = (((eye - at[:, 0]) * normal).sum(axis=1) < 0) & (back[:, 0] != NO_BACK)
+    behind = (_dot(eye - at[:, 0], normal) < 0) & (back[:, 0] != NO_BACK)
     return np.where(behind[:, None], back, corners).astype(np.int64)
 
 
@@ -131,7 +131,11 @@ def squares_saved(mesh: WorldMesh, hits: Hits, radiance: F32, valid: Bools) -> F
 def _size(difference: npt.NDArray[np.floating]) -> F64:
     """Root mean square over the channels."""
     wide = difference.astype(np.float64)
-    return np.asarray(np.sqrt((wide * wide).mean(axis=-1)))
+    return np.asarray(np.sqrt(_dot(wide, wide) / wide.shape[-1]))
+
+
+def _dot(a: F64, b: F64) -> F64:
+    return np.asarray(np.einsum("nk,nk->n", a, b))
 
 
 def _far_corners(
@@ -149,12 +153,12 @@ def _far_corners(
         face, other, far = here // 3, there // 3, (there + 2) % 3
         a, b, c = (at[face, k] for k in range(3))
         along, across, out = b - a, c - a, at[other, far] - a
-        g11, g12, g22 = ((x * y).sum(axis=1) for x, y in ((along, along), (along, across), (across, across)))
-        r1, r2 = (along * out).sum(axis=1), (across * out).sum(axis=1)
+        g11, g12, g22 = _dot(along, along), _dot(along, across), _dot(across, across)
+        r1, r2 = _dot(along, out), _dot(across, out)
         det = np.maximum(g11 * g22 - g12 * g12, 1e-12 * g11 * g22 + 1e-300)
         u, v = (r1 * g22 - r2 * g12) / det, (r2 * g11 - r1 * g12) / det
         weights = np.clip(np.stack([1 - u - v, u, v], axis=1), -4, 4)
-        guess = (weights[:, :, None] * shown[face]).sum(axis=1)
+        guess = np.einsum("nk,nkc->nc", weights, shown[face])
         missed[row, two] = _size(guess - shown[other, far])
     of_edge = missed.max(axis=0)
     of_face = of_edge[of].max(axis=1)
