@@ -47,3 +47,28 @@ def power(pixels: F64) -> F64:
         weights[min(max(row, 0), height - 1)] += (1 - (v - row)) * ring
         weights[min(max(row + 1, 0), height - 1)] += (v - row) * ring
     return np.einsum("hwc,h->c", pixels, weights) * 2 * math.pi / width
+
+
+def vector(pixels: F64, steps: int = 16) -> F64:
+    """∫ L ω dω (3 channels, 3 axes) of the bilinear map, by the midpoints of a grid `steps` times as fine."""
+    height, width = pixels.shape[:2]
+    down, across = _between(height, steps, wrap=False), _between(width, steps, wrap=True)
+    fine = np.einsum("ih,hwc,jw->ijc", down, pixels, across, optimize=True)
+    theta = np.pi * (np.arange(height * steps) + 0.5) / (height * steps)
+    phi = 2 * np.pi * (0.5 - (np.arange(width * steps) + 0.5) / (width * steps))
+    cell = 2 * np.sin(theta) * math.sin(math.pi / (2 * height * steps)) * 2 * np.pi / (width * steps)
+    sine, cosine = np.meshgrid(np.sin(theta), phi * 0 + 1, indexing="ij")[0], np.cos(theta)[:, None]
+    towards = np.stack([sine * np.sin(phi), cosine + 0 * phi, sine * np.cos(phi)], axis=2)
+    return np.einsum("ijc,i,ija->ca", fine, cell, towards)
+
+
+def _between(count: int, steps: int, wrap: bool) -> F64:
+    """(count · steps, count): how places along an axis are interpolated from its pixel centres."""
+    made = np.zeros((count * steps, count))
+    for i in range(count * steps):
+        at = (i + 0.5) / steps - 0.5
+        first = math.floor(at)
+        for step, weight in ((0, 1 - (at - first)), (1, at - first)):
+            pixel = (first + step) % count if wrap else min(max(first + step, 0), count - 1)
+            made[i, pixel] += weight
+    return made
