@@ -226,27 +226,29 @@ class DirectionSet:
 
 @dataclass(frozen=True, eq=False)
 class DirectionList:
-    """Some cells of the set of 2^k directions, such as those where the light is: zeros fill up to 64."""
+    """Directions of our own choosing, such as those where the light is: zeros fill up to 64."""
 
-    k: int
-    leaves: I64
-    """(N,) which cells, in tree order."""
+    given: F32
+    """(N, 3) unit float32, neighbours near each other."""
+    solid_angle: float = 1.0
+    """Of each, in steradians."""
+
+    @staticmethod
+    def of_leaves(k: int, leaves: I64) -> DirectionList:
+        """The middles of some cells (N,) of the set of 2^k directions, in tree order."""
+        found = direction_set(k)
+        return DirectionList(found.directions[leaves], found.solid_angle)
 
     @property
     def size(self) -> int:
         """N rounded up to a multiple of 64."""
-        return -(-len(self.leaves) // 64) * 64
-
-    @property
-    def solid_angle(self) -> float:
-        """Of each cell, in steradians."""
-        return direction_set(self.k).solid_angle
+        return -(-len(self.given) // 64) * 64
 
     @cached_property
     def directions(self) -> F32:
         """(size, 3): unit directions, then zeros, which no ray follows."""
         made = np.zeros((self.size, 3), np.float32)
-        made[: len(self.leaves)] = direction_set(self.k).directions[self.leaves]
+        made[: len(self.given)] = self.given
         return made
 
     @cached_property

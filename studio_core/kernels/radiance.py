@@ -165,6 +165,8 @@ def _bit_index(lowest: np.uint64) -> int:
 
 @kernel
 def lamp_terms(
+    start: int,
+    stop: int,
     points: I64,
     positions: F32,
     normals: F32,
@@ -172,6 +174,7 @@ def lamp_terms(
     eye: F32,
     to_lamp: F32,
     weight: F32,
+    colour: F32,
     seen: npt.NDArray[np.bool_],
     address: I64,
     terms: I64,
@@ -180,10 +183,12 @@ def lamp_terms(
     out_terms: F32,
     out_irradiance: F32,
 ) -> None:
-    """Adds one lamp at white unit gain: Q samples a point.
+    """Adds one lamp's terms (V, TERMS, 3) and irradiance (V, 3) for points[start:stop]: Q samples each.
 
-    to_lamp (P, Q, 3) unit directions, weight (P, Q) irradiance of each on a surface facing it,
-    seen (P, Q). Q ≤ BATCH.
+    to_lamp (P, Q, 3) unit directions; weight (P, Q) times colour (Q, 3) is what each sample gives to a
+    surface that faces it; seen (P, Q). Where all points share them, to_lamp and weight may have one row for
+    all; where all samples share it, colour may: np.ones((1, 3)) for a white lamp, a sun's irradiance (Q, 3)
+    with a weight of ones((1, Q)). Q ≤ BATCH.
     """
     axes = np.empty((3, 3))
     wo = np.empty(3, np.float32)
@@ -193,34 +198,43 @@ def lamp_terms(
     values = np.empty(out_terms.shape[1] * BATCH, np.float32)
     sums = np.empty((out_terms.shape[1], 3))
     samples = weight.shape[1]
-    for row in range(len(points)):
+    own_way, own_weight, own_colour = len(to_lamp) > 1, len(weight) > 1, len(colour) > 1
+    for row in range(start, stop):
         p = points[row]
+        towards, given = to_lamp[row if own_way else 0], weight[row if own_weight else 0]
         frame(normals[p, 0], normals[p, 1], normals[p, 2], axes)
         local_view(positions[p], eye, axes, wo)
         m = material[p]
         count = 0
-        total = 0.0
         for q in range(samples):
-            d = to_lamp[row, q]
+            d = towards[q]
             z = axes[2, 0] * d[0] + axes[2, 1] * d[1] + axes[2, 2] * d[2]
-            if z > 0.0 and weight[row, q] > 0.0 and seen[row, q]:
+            if z > 0.0 and given[q] > 0.0 and seen[row, q]:
                 keep[count] = q
                 count += 1
-                total += weight[row, q] * z
+        if count == 0:
+            continue
+        red, green, blue = 0.0, 0.0, 0.0
         for j in range(count):
-            d = to_lamp[row, keep[j]]
+            q = keep[j]
+            d = towards[q]
             z = axes[2, 0] * d[0] + axes[2, 1] * d[1] + axes[2, 2] * d[2]
             wi[j] = axes[0, 0] * d[0] + axes[0, 1] * d[1] + axes[0, 2] * d[2]
             wi[count + j] = axes[1, 0] * d[0] + axes[1, 1] * d[1] + axes[1, 2] * d[2]
             wi[2 * count + j] = z
-            light[:, j] = weight[row, keep[j]] * z
-        if count:
-            sums[:] = 0.0
-            _flush(count, address[m], terms[m], shapes[offset[m] :], wo, wi, light, values, sums)
-            for k in range(terms[m]):
-                for c in range(3):
-                    out_terms[p, k, c] += sums[k, c]
-            out_irradiance[p] += total
+            own, facing = colour[q if own_colour else 0], given[q] * z
+            light[0, j], light[1, j], light[2, j] = own[0] * facing, own[1] * facing, own[2] * facing
+            red += own[0] * facing
+            green += own[1] * facing
+            blue += own[2] * facing
+        sums[:] = 0.0
+        _flush(count, address[m], terms[m], shapes[offset[m] :], wo, wi, light, values, sums)
+        for k in range(terms[m]):
+            for c in range(3):
+                out_terms[p, k, c] += sums[k, c]
+        out_irradiance[p, 0] += red
+        out_irradiance[p, 1] += green
+        out_irradiance[p, 2] += blue
 
 
 __all__ = ["BATCH", "environment_terms", "frame", "lamp_terms", "local_view"]

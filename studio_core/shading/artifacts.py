@@ -21,6 +21,7 @@ from studio_core.session import View
 if TYPE_CHECKING:
     from studio_core.kernels.light_tree import LightTree
     from studio_core.kernels.raycast import RayCaster
+    from studio_core.kernels.suns import Sun
     from studio_core.scene.face_tree import FaceTree
     from studio_core.scene.world_mesh import WorldMesh
 
@@ -123,14 +124,19 @@ class Lamp:
 class Lighting:
     """All lights at unit gain: one layer of radiance each.
 
-    `tree` holds the environment integrated over the leaves of the finest direction set; None without one.
-    `integrated` tells of which picture, rotation and fineness.
+    `tree` holds the environment without its suns, over the leaves of a direction set, mostly the finest (at
+    least 2^15: take the smaller of the level wanted and `tree.k`); None without an environment. `sun` holds
+    what is too bright and too small for leaves, or is None; both together are the environment's layer.
+    `integrated` tells of which picture, rotation and fineness both are: equal where these are the same.
+    `coarse` says that they are good for the time while a hand turns the light.
     """
 
     environment: Environment | None
     tree: LightTree | None
     lamps: tuple[Lamp, ...]
     integrated: tuple[object, ...] = ()
+    sun: Sun | None = None
+    coarse: bool = False
 
     @property
     def layers(self) -> tuple[NodeId, ...]:

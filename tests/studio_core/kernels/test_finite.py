@@ -85,8 +85,8 @@ def test_lamp_sums(host, model, normal, tilt, towards_tilt, power, place):
     towards = grazing(n, towards_tilt)[None, None]
     out, irradiance = np.zeros((1, TERMS, 3), np.float32), np.zeros((1, 3), np.float32)
     where = (np.zeros(1, np.int64), position, n[None], np.zeros(1, np.int32), eye)
-    light = (towards, np.full((1, 1), weight), np.ones((1, 1), np.bool_))
-    lamp_terms(*where, *light, *tables(host, model), out, irradiance)
+    light = (towards, np.full((1, 1), weight), np.ones((1, 3), np.float32), np.ones((1, 1), np.bool_))
+    lamp_terms(0, 1, *where, *light, *tables(host, model), out, irradiance)
     assert np.isfinite(out).all()
     assert (out >= 0).all()
     assert (irradiance <= 1.0001 * weight).all()

@@ -100,26 +100,30 @@ def test_only_the_wanted_points_are_written(host):
 
 
 @pytest.mark.parametrize("samples", [1, 7, 256])
-def test_lamp_sum_equals_the_oracle(host, samples):
+@pytest.mark.parametrize("kind", ["white lamp", "coloured lamp", "sun"])
+def test_lamp_sum_equals_the_oracle(host, samples, kind):
     rng = np.random.default_rng(samples)
     brdfs, shapes, address, terms, offsets, data = _tables(host)
     count = 8
     positions, normals = _points(rng, count)
     material = np.arange(count, dtype=np.int32) % len(brdfs)
-    towards = rng.normal(size=(count, samples, 3))
+    rows, colours = (1 if kind == "sun" else count), (1 if kind == "white lamp" else samples)
+    towards = rng.normal(size=(rows, samples, 3))
     towards = (towards / np.linalg.norm(towards, axis=2, keepdims=True)).astype(np.float32)
-    weight = rng.random((count, samples)).astype(np.float32)
+    weight = rng.random((rows, samples)).astype(np.float32)
+    colour = rng.random((colours, 3)).astype(np.float32)
     seen = rng.random((count, samples)) < 0.7
     eye = np.array([1.0, 2.0, 3.0], np.float32)
     out, irradiance = np.zeros((count, TERMS, 3), np.float32), np.zeros((count, 3), np.float32)
     points = np.arange(count, dtype=np.int64)
-    arguments = (positions, normals, material, eye, towards, weight, seen)
-    lamp_terms(points, *arguments, address, terms, offsets, data, out, irradiance)
+    arguments = (positions, normals, material, eye, towards, weight, colour, seen)
+    for start, stop in ((0, 3), (3, count)):
+        lamp_terms(start, stop, points, *arguments, address, terms, offsets, data, out, irradiance)
     for p in range(count):
-        m = material[p]
-        light = np.repeat(weight[p, :, None], 3, axis=1)
+        m, row = material[p], p % rows
+        light = weight[row, :, None] * np.broadcast_to(colour, (samples, 3))
         expected, lit = light_sum(
-            brdfs[m], shapes[m], positions[p], normals[p], eye, seen[p], towards[p], light, 1.0
+            brdfs[m], shapes[m], positions[p], normals[p], eye, seen[p], towards[row], light, 1.0
         )
         np.testing.assert_allclose(out[p, : terms[m]], expected, rtol=5e-4, atol=1e-6)
         np.testing.assert_allclose(irradiance[p], lit, rtol=1e-5, atol=1e-6)

@@ -39,12 +39,13 @@ def tree(seed=0, sun=True):
 def test_splitting_keeps_the_light_and_bounds_what_a_ray_stands_for():
     whole = tree()
     parts = split_light(whole, 12)
-    total = sum((light.sum(axis=0) * d.solid_angle for d, light in parts))
+    total = sum((part.light.sum(axis=0) * part.directions.solid_angle for part in parts))
     np.testing.assert_allclose(total, whole.prefix_power[-1], rtol=1e-5)
-    share = parts[0][1].sum(axis=1) / (whole.coarsened(12).radiance.sum())
+    share = parts[0].light.sum(axis=1) / (whole.coarsened(12).radiance.sum())
     assert share.max() <= max(HEAVY, 4 / (1 << 12))
-    assert len(parts[1][0].leaves) % 4 == 0
-    np.testing.assert_array_equal(np.unique(parts[1][0].leaves >> 2), np.unique(parts[1][0].leaves[::4] >> 2))
+    leaves = direction_set(14).leaf_of(parts[1].directions.given)
+    assert len(leaves) % 4 == 0
+    np.testing.assert_array_equal(np.unique(leaves >> 2), leaves[::4] >> 2)
 
 
 def test_the_finest_directions_are_not_split():
@@ -60,7 +61,7 @@ def test_a_list_of_directions_sees_what_the_set_sees(workers):
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     every = direction_set(10)
     chosen = np.sort(rng.choice(1024, 200, replace=False)).astype(np.int64)
-    some = DirectionList(10, chosen)
+    some = DirectionList.of_leaves(10, chosen)
     with RayCaster([CasterObject(corners, faces, "soup", np.eye(4), None)]) as caster:
         full = trace_visibility(caster, points, normals, every, workers).words
         part = trace_visibility(caster, points, normals, some, workers).words
