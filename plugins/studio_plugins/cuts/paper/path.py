@@ -3,15 +3,15 @@
 `PaperPath` keeps self-visibility cuts, visibility cut fields and, per receiver, the cut of v_k (equation
 (3)) that their product makes. After a translation nothing is traced but samples that receivers touch for
 the first time, and only receivers are multiplied anew for which the moved object hides something, or hid
-something where it was. Light and view cost no product.
+something where it was. Their product without it is kept, so that every further step of a drag multiplies
+one field. Light and view cost no product.
 """
 
 from __future__ import annotations
 
 import dataclasses
 import time
-from collections.abc import Hashable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Hashable, Iterable, Sequence
 
 import numpy as np
 import numpy.typing as npt
@@ -19,19 +19,17 @@ import numpy.typing as npt
 from studio_core.kernels.directions import direction_set
 from studio_core.kernels.light_tree import LightTree
 from studio_core.kernels.raycast import RayCaster
-from studio_core.kernels.visibility import lifted
 from studio_core.parallel import Checkpoints, Workers
 from studio_core.scene.world_mesh import WorldMesh
 from studio_plugins.cuts.nodes import FLOATS, NodeBlock
 from studio_plugins.cuts.paper import placement
 from studio_plugins.cuts.paper.height_cuts import HIGHEST_K
 from studio_plugins.cuts.paper.kept_products import KeptProducts
-from studio_plugins.cuts.paper.placement import Placement, touch
 from studio_plugins.cuts.paper.product import multiply, multiply_by_counters
 from studio_plugins.cuts.paper.records import CutSizes
 from studio_plugins.cuts.paper.settings import PaperCounts, PaperParams
 from studio_plugins.cuts.paper.shading import irradiance_of, nodes_of
-from studio_plugins.cuts.paper.svc import SelfVisibility
+from studio_plugins.cuts.paper.stores import PlacedCuts
 from studio_plugins.cuts.paper.vcf import VisibilityCutField
 
 U8 = npt.NDArray[np.uint8]
@@ -41,20 +39,10 @@ F64 = npt.NDArray[np.float64]
 
 CHUNK = 32  # receivers of a product
 LIGHT_CHUNK = 256
+REST = 0.25
+"""Share of the allowed error to which products without the moving objects are merged."""
 BLOCK = 1024
 """Receivers in a block of nodes."""
-
-
-@dataclass(eq=False)
-class _Item:
-    """One object as it is placed."""
-
-    mesh: object
-    identity: Hashable
-    turned: Hashable
-    sphere: F64
-    own: SelfVisibility
-    field: VisibilityCutField
 
 
 class PaperPath:
@@ -71,15 +59,17 @@ class PaperPath:
             raise ValueError("a field needs two spheres or more of one cell or more, and no negative error")
         self._workers = workers
         self._directions = direction_set(self.params.k)
-        self._items: list[_Item] = []
-        self._mesh: WorldMesh | None = None
-        self._shadow: RayCaster | None = None
-        self._pending: dict[int, tuple[F64, VisibilityCutField]] = {}
-        self._products = KeptProducts(0)
+        self._placed: PlacedCuts | None = None
+        self._start_over(0)
         self._done = PaperCounts()
-        self._seconds = dict.fromkeys(("svc", "vcf", "product", "light", "concerned"), 0.0)
+        self._seconds = dict.fromkeys(("product", "light", "concerned"), 0.0)
 
-    # placing
+    @property
+    def placed(self) -> PlacedCuts:
+        """Objects and their cuts; ValueError before anything was placed."""
+        if self._placed is None:
+            raise ValueError("nothing is placed yet")
+        return self._placed
 
     def place(self, mesh: WorldMesh, shadow: RayCaster, identities: Sequence[Hashable]) -> None:
         """Takes over where things are; cheap, what it costs is paid when receivers are asked for.
@@ -88,40 +78,25 @@ class PaperPath:
         same (geometry and which faces stop light). Cuts of meshes, rotations and scales that are gone are
         dropped.
         """
-        if len(shadow) != len(mesh.objects) or len(identities) != len(mesh.objects):
-            raise ValueError("the caster, the mesh and the identities must hold the same objects")
-        before = self._items
-        owns = {(item.mesh, item.identity, item.turned): item.own for item in before}
-        fields = {(item.identity, item.turned): item.field for item in before}
-        items = []
-        for index, placed in enumerate(mesh.objects):
-            part = shadow.part(index)
-            turned = (placed.transform.rotation, placed.transform.scale)
-            key = (identities[index], turned)
-            own_key = (placed.mesh, *key)
-            if key not in fields:
-                fields[key] = VisibilityCutField(part.radius, self.params.shells, self.params.cells)
-            if own_key not in owns:
-                owns[own_key] = SelfVisibility(len(placed.mesh))
-            radius = part.radius if part.scene else 0.0
-            sphere = np.append(part.centre - mesh.origin, radius)
-            items.append(_Item(placed.mesh, key[0], turned, sphere, owns[own_key], fields[key]))
-        same = (
-            self._mesh is not None
-            and np.array_equal(self._mesh.origin, mesh.origin)
-            and [item.mesh for item in before] == [item.mesh for item in items]
-        )
-        if same:
-            for index, (old, new) in enumerate(zip(before, items, strict=True)):
-                if old.field is not new.field or not np.array_equal(old.sphere, new.sphere):
-                    self._pending.setdefault(index, (old.sphere, old.field))
-                    self._products.drop(np.arange(mesh.vertex_offsets[index], mesh.vertex_offsets[index + 1]))
-        self._items, self._mesh, self._shadow = items, mesh, shadow
-        if not same:
-            self._pending = {}
-            self._products = KeptProducts(len(mesh))
+        before = self._placed
+        self._placed = PlacedCuts(mesh, shadow, identities, self.params, self._workers, before)
+        changed = None if before is None else self._placed.changed_since(before)
+        if changed is None or before is None:
+            self._start_over(len(mesh))
+            return
+        for index in changed:
+            old = before.objects[index]
+            self._pending.setdefault(index, (old.sphere, old.field))
+            self._products.drop(np.arange(mesh.vertex_offsets[index], mesh.vertex_offsets[index + 1]))
 
-    # results
+    def _start_over(self, count: int) -> None:
+        """No receiver has a product."""
+        self._pending: dict[int, tuple[F64, VisibilityCutField]] = {}
+        self._products = KeptProducts(count)
+        # While objects are dragged: products without them, of the receivers that they concern.
+        self._moving: frozenset[int] = frozenset()
+        self._dragged: npt.NDArray[np.bool_] = np.zeros(count, np.bool_)
+        self._rests = KeptProducts(count)
 
     def irradiance(self, points: I64, tree: LightTree, job: Checkpoints | None = None) -> F32:
         """(P, 3): Σ_k l_k v_k at rows `points` of the mesh, equation (3) with a BRDF of 1."""
@@ -139,8 +114,7 @@ class PaperPath:
     def nodes(self, points: I64, tree: LightTree, job: Checkpoints | None = None) -> list[NodeBlock]:
         """The nodes of equation (3) at rows `points` of the mesh: ω_k and l_k v_k, in blocks of 1,024."""
         numbers, values, sizes = self._cuts(points, tree, job)
-        assert self._mesh is not None
-        normals, axis = self._mesh.normals, self._directions.cones.axis
+        normals, axis = self.placed.mesh.normals, self._directions.cones.axis
         started = time.perf_counter()
         blocks = []
         for begin in range(0, len(points), BLOCK):
@@ -184,43 +158,23 @@ class PaperPath:
         """How many receivers have a product, as far as is known: a move may have outdated some."""
         return len(self._products.known)
 
-    def sampled_fields(
-        self, samples: int, rng: np.random.Generator, job: Checkpoints | None = None
-    ) -> Iterator[tuple[CutSizes, int]]:
-        """Of every field, the sizes of some random samples, which are not kept, and how many it has."""
-        assert self._shadow is not None
-        seen = set()
-        for index, item in enumerate(self._items):
-            part = self._shadow.part(index)
-            if item.field in seen or not part.scene:
-                continue
-            seen.add(item.field)
-            other = VisibilityCutField(item.field.radius, self.params.shells, self.params.cells)
-            possible = len(other.table)
-            chosen = np.sort(rng.choice(possible, min(samples, possible), replace=False)).astype(np.int64)
-            occluded8 = self._shadow.handles().occluded8
-            other.trace(chosen, part, occluded8, self._directions, self._workers, job)
-            yield other.records.sizes, possible
-
     @property
     def counts(self) -> PaperCounts:
         """See `PaperCounts`."""
-        owns = {id(item.own): item.own for item in self._items}.values()
-        fields = {id(item.field): item.field for item in self._items}.values()
+        owns, fields = ([], []) if self._placed is None else (self._placed.owns, self._placed.fields)
+        stores = sum(own.nbytes for own in owns) + sum(made.nbytes for made in fields)
+        tracing = {} if self._placed is None else self._placed.seconds
         return dataclasses.replace(
             self._done,
             svc=sum((own.records.sizes for own in owns), CutSizes()),
             vcf=sum((made.records.sizes for made in fields), CutSizes()),
             fields=len(fields),
             vcf_possible=sum(len(made.table) for made in fields),
-            kept_bytes=sum(own.nbytes for own in owns)
-            + sum(made.nbytes for made in fields)
-            + self._products.nbytes,
+            kept_bytes=stores + self._products.nbytes + self._rests.nbytes,
             product_nodes=self._products.nodes,
-            seconds=dict(self._seconds),
+            rays=0 if self._placed is None else self._placed.rays,
+            seconds={**tracing, **self._seconds},
         )
-
-    # making cuts
 
     def _cuts(self, points: I64, tree: LightTree, job: Checkpoints | None) -> tuple[I64, I64, I64]:
         """Addresses of numbers and values of the product of each point, and its size."""
@@ -231,116 +185,68 @@ class PaperPath:
 
     def prepare(self, points: I64, job: Checkpoints | None = None) -> None:
         """Makes all cuts that `points` need; light adds little to it."""
-        if self._mesh is None:
-            raise ValueError("nothing is placed yet")
-        self._settle(job)
+        placed = self.placed
+        self._settle(placed, job)
         missing = self._products.without(points)
         if not len(missing):
             return
-        self._trace_own(missing, job)
-        self._touch(missing, np.ones(len(self._items), np.uint8), job)
-        self._multiply(missing, job)
+        everything = np.ones(len(placed.objects), np.uint8)
+        placed.trace_own(missing, job)
+        placed.touch(missing, everything, job)
+        again = missing[self._dragged[missing]]
+        if len(again):
+            moving = _flags(len(placed.objects), self._moving)
+            self._multiply(self._rests.without(again), 1 - moving, self._rests, None, REST, job)
+            self._multiply(again, moving, self._products, self._rests, 1.0, job)
+            missing = missing[~self._dragged[missing]]
+        self._multiply(missing, everything, self._products, None, 1.0, job)
 
-    def _settle(self, job: Checkpoints | None) -> None:
+    def _settle(self, placed: PlacedCuts, job: Checkpoints | None) -> None:
         """Drops the products of receivers for which a moved object hides something, or did."""
-        if not self._pending:
+        objects = placed.objects
+        pending = {i: was for i, was in self._pending.items() if not objects[i].same_place(*was)}
+        if not pending:
+            self._pending = {}
             return
-        pending = self._pending
+        started = time.perf_counter()
         known = self._products.known
-        started = time.perf_counter()
-        only = np.zeros(len(self._items), np.uint8)
-        only[list(pending)] = 1
-        hit = self._touch(known, only, job)
-        for index, (sphere, old) in pending.items():
+        hit = placed.touch(known, _flags(len(objects), pending), job)
+        for index, (sphere, field) in pending.items():
             left = known[hit == 0]
-            if not len(left):
-                break
-            items = list(self._items)
-            items[index] = dataclasses.replace(items[index], sphere=sphere, field=old)
-            alone = np.zeros(len(items), np.uint8)
-            alone[index] = 1
-            hit[hit == 0] = self._ask(left, alone, self._placement(items), job)[1]
-        self._seconds["concerned"] += time.perf_counter() - started
-        self._products.drop(known[hit == 1])
+            earlier = list(objects)
+            earlier[index] = dataclasses.replace(objects[index], sphere=sphere, field=field)
+            alone = _flags(len(objects), [index])
+            hit[hit == 0] = placed.ask(left, alone, placed.placement(earlier), job)[1]
+        if not self._moving.issuperset(pending):
+            self._rests, self._moving = KeptProducts(len(self._dragged)), frozenset(pending)
+            self._dragged[:] = False
+        concerned = known[hit == 1]
+        standing = ~np.isin(placed.mesh.object[concerned], list(self._moving))
+        self._dragged[concerned[standing]] = True
+        self._products.drop(concerned)
         self._pending = {}
+        self._seconds["concerned"] += time.perf_counter() - started
 
-    def _trace_own(self, points: I64, job: Checkpoints | None) -> None:
-        assert self._mesh is not None
-        assert self._shadow is not None
-        mesh, shadow = self._mesh, self._shadow
-        started = time.perf_counter()
-        objects = mesh.object[points]
-        for index in np.unique(objects).tolist():
-            own = self._items[index].own
-            chosen = points[objects == index]
-            rows = chosen - mesh.vertex_offsets[index]
-            lacking = own.slots[rows] < 0
-            if not lacking.any():
-                continue
-            chosen, rows = chosen[lacking], rows[lacking]
-            world = mesh.positions[chosen] + mesh.origin
-            origins = lifted(shadow, world, mesh.geometric[chosen], mesh.inset[chosen])
-            rays = own.rays
-            own.trace(
-                rows,
-                shadow.centre + origins.astype(np.float64),
-                mesh.normals[chosen].astype(np.float64),
-                shadow.part(index),
-                shadow.handles().occluded8,
-                self._directions,
-                self.params.threshold,
-                self._workers,
-                job,
-            )
-            self._count_rays(own.rays - rays)
-        self._seconds["svc"] += time.perf_counter() - started
-
-    def _touch(self, points: I64, only: U8, job: Checkpoints | None) -> U8:
-        """Traces the samples that points need of some objects; (P,) whether one of these hides anything."""
-        counts, hit = self._ask(points, only, self._placement(self._items), job)
-        if not counts[:, placement.MISSING].any():
-            return hit
-        assert self._shadow is not None
-        started = time.perf_counter()
-        occluded8 = self._shadow.handles().occluded8
-        for index in np.flatnonzero(only).tolist():
-            made, part = self._items[index].field, self._shadow.part(index)
-            wanted = made.wanted()
-            if len(wanted) and part.scene:
-                rays = made.rays
-                made.trace(wanted, part, occluded8, self._directions, self._workers, job)
-                self._count_rays(made.rays - rays)
-        self._seconds["vcf"] += time.perf_counter() - started
-        return self._ask(points, only, self._placement(self._items), job)[1]
-
-    def _count_rays(self, rays: int) -> None:
-        assert self._shadow is not None
-        self._shadow.count(rays)
-        self._done = dataclasses.replace(self._done, rays=self._done.rays + rays)
-
-    def _ask(self, points: I64, only: U8, placed: Placement, job: Checkpoints | None) -> tuple[I64, U8]:
-        mesh = self._mesh
-        assert mesh is not None
-        counts = np.zeros((len(points), placement.COUNTS), np.int64)
-        hit = np.zeros(len(points), np.uint8)
-        arguments = placed.arguments(points, mesh)
-
-        def body(start: int, stop: int) -> None:
-            touch(start, stop, *arguments, only, counts, hit)
-
-        self._workers.run(len(points), LIGHT_CHUNK, body, job)
-        return counts, hit
-
-    def _multiply(self, points: I64, job: Checkpoints | None) -> None:
-        mesh = self._mesh
-        assert mesh is not None
+    def _multiply(
+        self,
+        points: I64,
+        only: U8,
+        into: KeptProducts,
+        base: KeptProducts | None,
+        part: float,
+        job: Checkpoints | None,
+    ) -> None:
+        """Products of objects `only` with Ṽ_s or with those of `base`, merged to `part` of the error."""
+        if not len(points):
+            return
         started = time.perf_counter()
         counts = np.zeros((len(points), placement.COUNTS), np.int64)
-        placed = self._placement(self._items)
-        arguments = placed.arguments(points, mesh)
+        arguments = self.placed.placement(self.placed.objects).arguments(points, self.placed.mesh)
+        none = np.zeros(len(points), np.int64)
+        numbers_at, values_at, sizes_at = (none, none, none - 1) if base is None else base.addresses(points)
         size = self._directions.size
         made: dict[int, tuple[npt.NDArray[np.uint16], F32, npt.NDArray[np.int32]]] = {}
-        merge = self.params.merge
+        merge = part * self.params.merge
         limit = np.float32(merge * merge * size if merge > 0 else -1)
         by = multiply_by_counters if self.params.operations == "counters" else multiply
 
@@ -348,7 +254,20 @@ class PaperPath:
             numbers = np.empty((stop - start) * size, np.uint16)
             values = np.empty((stop - start) * size, np.float32)
             sizes = np.empty(stop - start, np.int32)
-            used = by(start, stop, *arguments, counts, limit, numbers, values, sizes)
+            used = by(
+                start,
+                stop,
+                *arguments,
+                counts,
+                only,
+                numbers_at,
+                values_at,
+                sizes_at,
+                limit,
+                numbers,
+                values,
+                sizes,
+            )
             made[start] = numbers[:used].copy(), values[:used].copy(), sizes
 
         self._workers.run(len(points), CHUNK, body, job)
@@ -356,29 +275,12 @@ class PaperPath:
             raise RuntimeError("a sample was not traced before it was used")
         for start in sorted(made):
             numbers, values, sizes = made[start]
-            self._products.put(points[start : start + len(sizes)], sizes, numbers, values)
-        total = counts.sum(axis=0)
-        self._done = dataclasses.replace(
-            self._done,
-            products=self._done.products + len(points),
-            pairs_used=self._done.pairs_used + int(total[placement.USED]),
-            pairs_under_horizon=self._done.pairs_under_horizon + int(total[placement.HORIZON]),
-            pairs_hidden=self._done.pairs_hidden + int(total[placement.HIDDEN]),
-            pairs_inside=self._done.pairs_inside + int(total[placement.NEAR]),
-            pairs_beyond=self._done.pairs_beyond + int(total[placement.FAR]),
-        )
+            into.put(points[start : start + len(sizes)], sizes, numbers, values)
+        self._done = self._done.with_product(counts.sum(axis=0), 0 if into is self._rests else len(points))
         self._seconds["product"] += time.perf_counter() - started
 
-    def _placement(self, items: Sequence[_Item]) -> Placement:
-        assert self._mesh is not None
-        selfs = np.zeros((len(items), 5), np.int64)
-        fields = np.zeros((len(items), 4), np.int64)
-        for index, item in enumerate(items):
-            selfs[index, 0] = item.own.slots.ctypes.data
-            selfs[index, 1:4] = item.own.records.addresses
-            selfs[index, 4] = self._mesh.vertex_offsets[index]
-            fields[index, 0] = item.field.table.ctypes.data
-            fields[index, 1:] = item.field.records.addresses
-        spheres = np.array([item.sphere for item in items]).reshape(-1, 4)
-        p = self.params
-        return Placement(selfs, fields, spheres, p.shells, p.cells, p.k, p.horizon, p.hidden, list(items))
+
+def _flags(count: int, chosen: Iterable[int]) -> U8:
+    flags = np.zeros(count, np.uint8)
+    flags[list(chosen)] = 1
+    return flags

@@ -26,6 +26,7 @@ from studio_plugins.cuts.paper.height_cuts import bit_at, height_at, value_at
 from studio_plugins.cuts.paper.shells import BEYOND, INSIDE, NEIGHBOURS, neighbours
 
 U8 = npt.NDArray[np.uint8]
+U16 = npt.NDArray[np.uint16]
 I32 = npt.NDArray[np.int32]
 I64 = npt.NDArray[np.int64]
 F32 = npt.NDArray[np.float32]
@@ -113,6 +114,20 @@ def hides_open(dx: float, dy: float, dz: float, radius: float, cones: F64, mask:
 def bytes_at(address: int) -> U8:
     """The bytes at an address; whoever gave it knows how many."""
     made: U8 = carray(pointer(address), (_HUGE,), np.uint8)
+    return made
+
+
+@kernel
+def u16_at(address: int) -> U16:
+    """The numbers at an address."""
+    made: U16 = carray(pointer(address), (_HUGE,), np.uint16)
+    return made
+
+
+@kernel
+def f32_at(address: int) -> F32:
+    """The numbers at an address."""
+    made: F32 = carray(pointer(address), (_HUGE,), np.float32)
     return made
 
 

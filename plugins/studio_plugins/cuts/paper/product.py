@@ -23,10 +23,12 @@ from studio_plugins.cuts.paper.placement import (
     COARSE,
     MISSING,
     bytes_at,
+    f32_at,
     i32_at,
     i64_at,
     neighbours_of,
     open_nodes,
+    u16_at,
 )
 from studio_plugins.cuts.paper.shells import NEIGHBOURS
 
@@ -89,6 +91,43 @@ def put_nodes(count: int, heights: U8, values: F32, k: int, numbers: U16, out: F
 
 
 @kernel
+def first_factor(
+    svc: U8,
+    at: int,
+    nodes: int,
+    numbers_address: int,
+    values_address: int,
+    size: int,
+    k: int,
+    heights: U8,
+    values: F32,
+) -> int:
+    """What objects are multiplied to, as a whole cut: Ṽ_s, or for size ≥ 0 a product made before."""
+    if size < 0:
+        for item in range(nodes):
+            heights[item] = height_at(svc, at, item)
+            values[item] = value_at(svc, at, nodes, item)
+        return nodes
+    numbers, given = u16_at(numbers_address), f32_at(values_address)
+    count, leaf = 0, 0
+    for item in range(size + 1):
+        height, start = 0, 1 << k
+        if item < size:
+            while (int(numbers[item]) << height) < 1 << k:
+                height += 1
+            start = (int(numbers[item]) << height) - (1 << k)
+        while leaf < start:  # the nodes between are 0
+            heights[count], values[count] = aligned_height(leaf, start), np.float32(0)
+            leaf += 1 << heights[count]
+            count += 1
+        if item < size:
+            heights[count], values[count] = height, given[item]
+            leaf += 1 << height
+            count += 1
+    return count
+
+
+@kernel
 def multiply(
     start: int,
     stop: int,
@@ -106,6 +145,10 @@ def multiply(
     hidden: bool,
     cones: F64,
     counts: I64,
+    only: U8,
+    base_numbers: I64,
+    base_values: I64,
+    base_sizes: I64,
     limit: np.float32,
     numbers: U16,
     values: F32,
@@ -113,7 +156,9 @@ def multiply(
 ) -> int:
     """The cut of v_k at points[start:stop], by intervals: heap numbers and values of nodes that are not 0.
 
-    sizes (stop − start,) gets their counts; returns how many in all. `limit` as in `push`.
+    Objects in `only` (O,) are multiplied to Ṽ_s, or to the product at the addresses of base_… (P,), of
+    base_sizes (P,) nodes (−1: to Ṽ_s). sizes (stop − start,) gets the counts of nodes; returns how many in
+    all. `limit` as in `push`.
     """
     size = 1 << k
     samples, weights = np.empty(NEIGHBOURS, np.int64), np.empty(NEIGHBOURS, np.int32)
@@ -123,20 +168,21 @@ def multiply(
     changed = np.zeros((size >> 6) + 1, np.uint64)
     boundaries = np.zeros((size >> 6) + 1, np.uint64)
     heights, averages, spreads = _stack(size)
+    base_heights, base_factors = np.empty(size, np.uint8), np.empty(size, np.float32)
     made = 0
     for row in range(start, stop):
         p = points[row]
         own = object_of[p]
         slot = i32_at(selfs[own, 0])[p - selfs[own, 4]]
         at = i64_at(selfs[own, 1])[slot]
-        nodes = i32_at(selfs[own, 2])[slot]
+        nodes = int(i32_at(selfs[own, 2])[slot])
         svc = bytes_at(selfs[own, 3])
         if hidden:
             open_nodes(svc, at, nodes, k, mask)
         product[:] = np.float32(1)
         boundaries[:] = np.uint64(0)
         for i in range(len(spheres)):
-            if i == own or spheres[i, 3] <= 0:
+            if i == own or only[i] == 0 or spheres[i, 3] <= 0:
                 continue
             count = neighbours_of(
                 positions[p],
@@ -164,11 +210,21 @@ def multiply(
                 add_changes(records, starts[entry], lengths[entry], weights[item], differences, changed)
             if count > 0:
                 multiply_sums(differences, changed, product, boundaries)
+        nodes = first_factor(
+            svc,
+            at,
+            nodes,
+            base_numbers[row],
+            base_values[row],
+            base_sizes[row],
+            k,
+            base_heights,
+            base_factors,
+        )
         top, leaf = 0, 0
         for item in range(nodes):
-            height = height_at(svc, at, item)
-            value = value_at(svc, at, nodes, item)
-            end = leaf + (1 << height)
+            value = base_factors[item]
+            end = leaf + (1 << base_heights[item])
             while leaf < end:
                 edge = next_boundary(boundaries, leaf, end) if value > 0 else end
                 v = value * product[leaf]
@@ -199,6 +255,10 @@ def multiply_by_counters(
     hidden: bool,
     cones: F64,
     counts: I64,
+    only: U8,
+    base_numbers: I64,
+    base_values: I64,
+    base_sizes: I64,
     limit: np.float32,
     numbers: U16,
     values: F32,
@@ -225,11 +285,19 @@ def multiply_by_counters(
         svc = bytes_at(selfs[own, 3])
         if hidden:
             open_nodes(svc, at, nodes, k, mask)
-        for item in range(nodes):
-            two_heights[item] = height_at(svc, at, item)
-            two_values[item] = value_at(svc, at, nodes, item)
+        nodes = first_factor(
+            svc,
+            at,
+            nodes,
+            base_numbers[row],
+            base_values[row],
+            base_sizes[row],
+            k,
+            two_heights,
+            two_values,
+        )
         for i in range(len(spheres)):
-            if i == own or spheres[i, 3] <= 0:
+            if i == own or only[i] == 0 or spheres[i, 3] <= 0:
                 continue
             count = neighbours_of(
                 positions[p],

@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
+import dataclasses
 from dataclasses import dataclass, field
 
+import numpy as np
+import numpy.typing as npt
+
+from studio_plugins.cuts.paper import placement
 from studio_plugins.cuts.paper.height_cuts import HIGHEST_K
 from studio_plugins.cuts.paper.records import CutSizes
 
@@ -52,3 +57,15 @@ class PaperCounts:
     pairs_inside: int = 0
     pairs_beyond: int = 0
     seconds: dict[str, float] = field(default_factory=dict)
+
+    def with_product(self, counts: npt.NDArray[np.int64], products: int) -> PaperCounts:
+        """After a run of the product kernels, with their counts (`placement.COUNTS`,)."""
+        return dataclasses.replace(
+            self,
+            products=self.products + products,
+            pairs_used=self.pairs_used + int(counts[placement.USED]),
+            pairs_under_horizon=self.pairs_under_horizon + int(counts[placement.HORIZON]),
+            pairs_hidden=self.pairs_hidden + int(counts[placement.HIDDEN]),
+            pairs_inside=self.pairs_inside + int(counts[placement.NEAR]),
+            pairs_beyond=self.pairs_beyond + int(counts[placement.FAR]),
+        )

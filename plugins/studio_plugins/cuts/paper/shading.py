@@ -5,13 +5,12 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from studio_core.jit import carray, kernel, pointer
+from studio_core.jit import kernel
 from studio_core.kernels.radiance import LOWEST_VIEW, frame
+from studio_plugins.cuts.paper.placement import f32_at, u16_at
 
 I64 = npt.NDArray[np.int64]
 F32 = npt.NDArray[np.float32]
-
-_HUGE = 1 << 40
 
 
 @kernel
@@ -29,8 +28,8 @@ def irradiance_of(
     """Σ_k l_k v_k of rows start … stop into out (P, 3); all but `node_sum` are per row of `points`."""
     for row in range(start, stop):
         red, green, blue = 0.0, 0.0, 0.0
-        numbers = carray(pointer(number_addresses[row]), (_HUGE,), np.uint16)
-        values = carray(pointer(value_addresses[row]), (_HUGE,), np.float32)
+        numbers = u16_at(number_addresses[row])
+        values = f32_at(value_addresses[row])
         for item in range(sizes[row]):
             node = numbers[item]
             value = values[item]
@@ -68,8 +67,8 @@ def nodes_of(
     for row in range(start, stop):
         p = points[row]
         frame(normals[p, 0], normals[p, 1], normals[p, 2], axes)
-        numbers = carray(pointer(number_addresses[row]), (_HUGE,), np.uint16)
-        values = carray(pointer(value_addresses[row]), (_HUGE,), np.float32)
+        numbers = u16_at(number_addresses[row])
+        values = f32_at(value_addresses[row])
         n = first[row + 1] - first[row]
         at = 6 * first[row]
         for item in range(n):

@@ -72,7 +72,7 @@ def whole_fields(
     """
     rng = np.random.default_rng(seed)
     cuts, nodes, leaves = 0, 0.0, 0.0
-    for found, possible in path.sampled_fields(samples, rng, job):
+    for found, possible in path.placed.sampled_fields(samples, rng, job):
         share = possible / max(found.cuts, 1)
         cuts, nodes, leaves = cuts + possible, nodes + found.nodes * share, leaves + found.leaves * share
     return CutSizes(cuts, round(nodes), round(leaves))

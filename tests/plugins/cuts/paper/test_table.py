@@ -25,7 +25,7 @@ def test_sizes_of_lazy_and_of_whole_fields(room: Any, workers: Workers) -> None:
     path.place(room.mesh, room.shadow, room.identities)
     path.prepare(np.arange(0, len(room.mesh), 9))
     whole = whole_fields(path, samples=10_000)
-    for index, item in enumerate(path._items):  # all samples there are: the estimate is the truth
+    for index, item in enumerate(path.placed.objects):  # all samples there are: the estimate is the truth
         item.field.table[item.field.table == 0] = -1
         part = room.shadow.part(index)
         occluded8 = room.shadow.handles().occluded8
