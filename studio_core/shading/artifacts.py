@@ -226,11 +226,15 @@ class Picture:
 
 @dataclass(frozen=True)
 class Error:
-    """sqrt(mean((shown − true)²)) / mean(true), its standard error, and how many places were looked at."""
+    """sqrt(mean((shown − true)²)) / mean(true), its standard error, and how many places were looked at.
+
+    p99: the 99th percentile of |shown − true| / mean(true), each a mean over the colours.
+    """
 
     relative_rmse: float
     uncertainty: float
     places: int
+    p99: float = 0.0
 
     def __str__(self) -> str:
         return f"{100 * self.relative_rmse:.1f} ± {100 * self.uncertainty:.1f} %"

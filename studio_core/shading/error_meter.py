@@ -45,14 +45,21 @@ RESAMPLINGS = 200
 
 
 def compare(shown: npt.ArrayLike, true: npt.ArrayLike, seed: int = 0) -> Error:
-    """The error of (N, 3) radiance; its standard error by bootstrap over the places."""
+    """The error of (N, 3) radiance; its standard error by bootstrap over the places.
+
+    All is relative to the mean of what is true. Where that is black and what is shown is not, it is relative
+    to the mean of what is shown: at least 1, as if all of it were wrong.
+    """
     a, b = np.asarray(shown, np.float64), np.asarray(true, np.float64)
-    if not len(b) or not b.any():
+    relative_to = b if b.any() else a
+    if not relative_to.any():
         return Error(0.0, 0.0, len(b))
-    squares, means = ((a - b) ** 2).mean(axis=1), b.mean(axis=1)
+    squares, means = ((a - b) ** 2).mean(axis=1), relative_to.mean(axis=1)
     drawn = np.random.default_rng(seed).integers(0, len(b), (RESAMPLINGS, len(b)))
     again = np.sqrt(squares[drawn].mean(axis=1)) / np.maximum(means[drawn].mean(axis=1), 1e-30)
-    return Error(float(np.sqrt(squares.mean()) / means.mean()), float(again.std()), len(b))
+    worst = np.percentile(np.abs(a - b).mean(axis=1), 99) / means.mean()
+    found = float(np.sqrt(squares.mean()) / means.mean())
+    return Error(found, float(again.std()), len(b), float(worst))
 
 
 class ErrorMeter:
@@ -60,23 +67,34 @@ class ErrorMeter:
 
     def __init__(self, services: Services, places: int = 256) -> None:
         self._workers = services.workers
-        self._places = places
+        self._places = places  # where none are asked for
         self._coefficients = CoefficientTable(services.registry)
 
-    def __call__(self, pipeline: Pipeline, frame: Frame, job: Job) -> MeasuredError | None:
-        """Errors of the pipeline's radiance for `frame`; None where nothing opaque is seen."""
-        radiance, hits = pipeline.artifact(Radiance), pipeline.artifact(Hits)
-        shapes, lighting = pipeline.artifact(Shapes), pipeline.artifact(Lighting)
-        casters = pipeline.artifact(Casters)
-        if radiance is None or hits is None or shapes is None or lighting is None or casters is None:
+    def __call__(
+        self, pipeline: Pipeline, frame: Frame, job: Job, places: int | None = None
+    ) -> MeasuredError | None:
+        """Errors of the pipeline's radiance for `frame`; None where nothing opaque is seen.
+
+        Layers that brute force does not make (light that came by way of other surfaces) are left out on
+        both sides. With more `places` the errors are surer: their standard error says how sure.
+        """
+        radiance, shapes = pipeline.artifact(Radiance), pipeline.artifact(Shapes)
+        lighting, casters = pipeline.artifact(Lighting), pipeline.artifact(Casters)
+        if radiance is None or shapes is None or lighting is None or casters is None:
             return None
+        hits = radiance.hits or pipeline.artifact(Hits)
+        if hits is None:
+            return None
+        known = {node: layer for node, layer in radiance.layers.items() if node in lighting.layers}
+        radiance = dataclasses.replace(radiance, layers=known)
+        places = self._places if places is None else places
         rng = np.random.default_rng(frame.revision)
         surfaces, mesh = radiance.surfaces, radiance.surfaces.mesh
         hit = np.flatnonzero(hits.face >= 0)
         candidates = hit[surfaces.opacity[mesh.face_material[hits.face[hit]]] >= 1]
         if not len(candidates):
             return None
-        chosen = np.sort(rng.choice(candidates, min(self._places, len(candidates)), replace=False))
+        chosen = np.sort(rng.choice(candidates, min(places, len(candidates)), replace=False))
         table = self._coefficients(frame.scene, surfaces)
         seen = _some(hits, chosen)
         points, uvs = surface_points(surfaces, seen, frame)
@@ -91,7 +109,7 @@ class ErrorMeter:
         dark = np.zeros((len(chosen), 3), np.float32)
         shown, true = sum(shown_layers.values(), dark), sum(true_layers.values(), dark)
         by_layer = {k: compare(shown_layers[k], true_layers[k]) for k in shown_layers}
-        vertices = self._vertices(radiance, shapes, lighting, casters, frame, table, rng, job)
+        vertices = self._vertices(radiance, shapes, lighting, casters, frame, table, rng, places, job)
         return MeasuredError(compare(shown, true), vertices, by_layer)
 
     def _vertices(
@@ -103,11 +121,12 @@ class ErrorMeter:
         frame: Frame,
         table: Coefficients,
         rng: np.random.Generator,
+        places: int,
         job: Job,
     ) -> Error:
         mesh = radiance.surfaces.mesh
         valid = np.flatnonzero(radiance.valid)
-        some = np.sort(rng.choice(valid, min(self._places, len(valid)), replace=False))
+        some = np.sort(rng.choice(valid, min(places, len(valid)), replace=False))
         points = ChosenPoints(
             mesh.origin,
             mesh.positions[some],
@@ -120,6 +139,7 @@ class ErrorMeter:
         lights = _lights(frame)
         first = table.table[table.first[mesh.material[some], 0]].reshape(-1, TERMS, 3)
         shown = (radiance.combined(lights)[some] * first).sum(axis=1)
+        truth = {node: truth[node] for node in radiance.layers}
         exact = dataclasses.replace(radiance, layers=truth, valid=np.ones(len(some), np.bool_))
         return compare(shown, (exact.combined(lights) * first).sum(axis=1))
 

@@ -39,7 +39,7 @@ def tree(seed=0, sun=True):
 def test_splitting_keeps_the_light_and_bounds_what_a_ray_stands_for():
     whole = tree()
     parts = split_light(whole, 12)
-    total = sum((part.light.sum(axis=0) * part.directions.solid_angle for part in parts))
+    total = sum(part.light.sum(axis=0) * part.directions.solid_angle for part in parts)
     np.testing.assert_allclose(total, whole.prefix_power[-1], rtol=1e-5)
     share = parts[0].light.sum(axis=1) / (whole.coarsened(12).radiance.sum())
     assert share.max() <= max(HEAVY, 4 / (1 << 12))

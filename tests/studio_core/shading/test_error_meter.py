@@ -8,13 +8,15 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scenes import sky
 
 from studio_core.contract import Services
 from studio_core.raster import PictureStage
 from studio_core.scene.diff import Changes
+from studio_core.scene.geometry import Image
 from studio_core.scene.nodes import Environment, PointLamp, Scene
 from studio_core.scene.transform import Transform
-from studio_core.shading.artifacts import Picture, Radiance
+from studio_core.shading.artifacts import Hits, Lighting, Picture, Radiance
 from studio_core.shading.error_meter import ErrorMeter, compare
 from studio_core.shading.frame import Frame
 from studio_core.shading.job import Job
@@ -54,7 +56,29 @@ def test_the_stated_uncertainty_covers_the_scatter():
 
 
 def test_nothing_to_compare_is_no_error():
-    assert compare(np.zeros((0, 3)), np.zeros((0, 3))).relative_rmse == 0
+    for count in (0, 5):
+        made = compare(np.zeros((count, 3)), np.zeros((count, 3)))
+        assert (made.relative_rmse, made.uncertainty, made.p99, made.places) == (0, 0, 0, count)
+
+
+@given(st.floats(1e-4, 1e6), st.integers(1, 50))
+def test_light_where_there_is_none_is_all_wrong(level, count):
+    made = compare(np.full((count, 3), level), np.zeros((count, 3)))
+    assert made.relative_rmse == pytest.approx(1)
+    assert made.p99 == pytest.approx(1)
+    spot = np.zeros((count + 1, 3))
+    spot[0] = level
+    assert compare(spot, np.zeros((count + 1, 3))).relative_rmse > 1
+
+
+def test_a_few_bad_places_show_in_the_percentile():
+    true = np.ones((1000, 3))
+    shown = true.copy()
+    shown[:15] += 0.5
+    made = compare(shown, true)
+    assert made.p99 == pytest.approx(0.5)
+    shown[10:15] = 1
+    assert compare(shown, true).p99 < 0.5
 
 
 def test_brute_force_has_no_error_at_its_vertices(services, host, little_scene):
@@ -88,6 +112,49 @@ def test_every_light_layer_has_its_error(services, host, little_scene):
     assert set(meter.layers) == set(pipeline.artifact(Radiance).layers)
     assert "lamp" in meter.layers
     assert all(np.isfinite(e.relative_rmse) for e in meter.layers.values())
+
+
+def test_layers_that_brute_force_does_not_make_are_left_out(services, host, little_scene):
+    scene = little_scene()
+    plain, _, pipeline, frame = measured(scene, services, host)
+    radiance = pipeline.artifact(Radiance)
+    other = dataclasses.replace(next(iter(radiance.layers.values())))
+    radiance.layers["bounced"] = other
+    meter = ErrorMeter(services, 300)(pipeline, frame, Job("measure"))
+    assert meter == plain
+    assert set(meter.layers) == {"sky"}
+
+
+def test_more_places_can_be_asked_for(services, host, little_scene):
+    _, _, pipeline, frame = measured(little_scene(), services, host, places=50)
+    meter = ErrorMeter(services, 50)
+    few, many = (meter(pipeline, frame, Job("measure"), places) for places in (None, 500))
+    assert (few.picture.places, many.picture.places) == (50, 500)
+    assert many.picture.uncertainty < few.picture.uncertainty
+    errors = many.as_dict()
+    assert errors["picture"]["p99"] > 0
+    assert errors["layers"]["sky"]["p99"] == many.layers["sky"].p99
+
+
+def test_the_hits_of_a_refined_mesh_are_its_own(services, host, little_scene):
+    """Radiance of a refined mesh brings its hits; those of the stage before it may be another mesh's."""
+    plain, _, pipeline, frame = measured(little_scene(), services, host)
+
+    class Refined:
+        def artifact(self, kind):
+            found = pipeline.artifact(kind)
+            return dataclasses.replace(found, face=np.full_like(found.face, -1)) if kind is Hits else found
+
+    assert ErrorMeter(services, 300)(Refined(), frame, Job("measure")) == plain
+
+
+def test_suns_have_no_error_at_vertices(services, host, little_scene):
+    image = np.array(sky(64).pixels)
+    image[9, 20] = [9e3, 7e3, 4e3]
+    scene = little_scene(environment=Image(image))
+    meter, _, pipeline, _ = measured(scene, services, host)
+    assert pipeline.artifact(Lighting).sun is not None
+    assert meter.vertices.relative_rmse < 1e-5
 
 
 def test_a_wrong_picture_is_seen_as_wrong(services, host, little_scene):
