@@ -89,26 +89,31 @@ def runs_of(words: U64, count: int, shift: int, out: Pool, place: int) -> int:
 
 
 @kernel
-def visible_words(pool: Pool, start: int, length: int, alive: npt.NDArray[np.bool_], words: U64) -> None:
-    """All bits set but those that a record's living slots block."""
-    words[:] = ONES
+def hide(pool: Pool, start: int, length: int, skip: npt.NDArray[np.bool_], words: U64) -> None:
+    """Clears the bits of all leaves that a record blocks, but for the slots to skip."""
     place, end = start, start + length
     while place < end:
         slot, count = int(pool[place]), int(pool[place + 1])
         place += 2
-        if alive[slot]:
+        if not skip[slot]:
             for pair in range(place, place + 2 * count, 2):
                 clear(words, int(pool[pair]), int(pool[pair + 1]))
         place += 2 * count
 
 
 @kernel
-def visible_runs(
-    pool: Pool, start: int, length: int, alive: npt.NDArray[np.bool_], words: U64, runs: Pool
-) -> int:
-    """Runs of visible leaves of a record, as pairs from 0; how many numbers were written."""
-    visible_words(pool, start, length, alive, words)
-    return runs_of(words, len(words), 0, runs, 0)
+def set_bits(words: U64, first: int, last: int) -> None:
+    """Sets the bits of leaves first … last."""
+    w, end = first >> 6, last >> 6
+    head = ONES << np.uint64(first & 63)
+    tail = ONES >> np.uint64(63 - (last & 63))
+    if w == end:
+        words[w] |= head & tail
+        return
+    words[w] |= head
+    for between in range(w + 1, end):
+        words[between] = ONES
+    words[end] |= tail
 
 
 @kernel

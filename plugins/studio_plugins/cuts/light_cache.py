@@ -2,36 +2,43 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Any
+
 import numpy as np
 import numpy.typing as npt
 
-from studio_core.colour import LUMINANCE
 from studio_core.kernels.light_tree import LightTree
 from studio_core.parallel import Workers
-from studio_core.shading.artifacts import ShadingPoints
+from studio_core.scene.world_mesh import WorldMesh
 from studio_core.shading.job import Job
-from studio_plugins.cuts.gather import MOST_NODES, gather_light, prefix_table
+from studio_plugins.cuts.choose import MOST_NODES, Prefix
+from studio_plugins.cuts.gather import gather_difference, gather_light
 from studio_plugins.cuts.nodes import FLOATS, NodeBlock, NodeTable
-from studio_plugins.cuts.store import VisibilityStore
+from studio_plugins.cuts.store import Sources, VisibilityStore
 
 I64 = npt.NDArray[np.int64]
 Bools = npt.NDArray[np.bool_]
 
 CHUNK = 128
 _FLOOR = 0.02  # of the irradiance of an open place: darker ones need no finer nodes
+_ROOM = 384  # nodes a point that room is made for at first
 
 
 class LightCache:
-    """Sums the light of one environment over the records of a store; owned by the compute thread."""
+    """Sums the light of one environment over the records of a store; owned by the compute thread.
+
+    `table` holds what exact records see; `difference` what coarse ones add to it or take away.
+    """
 
     def __init__(self, workers: Workers) -> None:
         self.table = NodeTable(0)
-        self.gathered = 0
+        self.difference = NodeTable(0)
         self._workers = workers
         self._tree: LightTree | None = None
         self._tolerance = 0.0
         self._generation = 0
-        self._prefix: npt.NDArray[np.float64] | None = None
+        self._prefix: Prefix | None = None
         self._stamp = np.zeros(0, np.int64)
         self._glossy = np.zeros(0, np.bool_)
 
@@ -39,12 +46,12 @@ class LightCache:
         """Turn to the vertices of a store and this light; what was summed under another is forgotten."""
         if tree is not self._tree:
             self._tree = tree
-            self._prefix = prefix_table(tree) if tree is not None else None
+            self._prefix = Prefix.of(tree) if tree is not None else None
             self._stamp[:] = 0
         if tolerance < self._tolerance or not self._tolerance:
             self._stamp[:] = 0
         self._tolerance = tolerance
-        count = len(store.exact.start)
+        count = len(store.exact)
         if store.generation != self._generation or tree is None:
             stamp, glossy = self._stamp, self._glossy
             self._stamp, self._glossy = np.zeros(count, np.int64), np.zeros(count, np.bool_)
@@ -56,54 +63,89 @@ class LightCache:
             else:
                 self.table = self.table.resized(count)
             self._generation = store.generation
+            self.difference = self.difference.resized(count)
 
-    def gather(
-        self, store: VisibilityStore, mesh: ShadingPoints, points: I64, glossy: Bools, job: Job
-    ) -> int:
+    def gather(self, store: VisibilityStore, mesh: WorldMesh, points: I64, glossy: Bools, job: Job) -> int:
         """Sums the light of those of the points whose record is another one, or that need nodes now.
 
         glossy (V,) says which vertices need nodes. How many points were summed.
         """
         if self._prefix is None:
             return 0
-        start, length, stamp = store.sources()
-        fresh = (self._stamp[points] == stamp[points]) & (self._glossy[points] | ~glossy[points])
-        todo = points[~fresh]
-        if not len(todo):
-            return 0
-        prefix, tolerance = self._prefix, self._tolerance
-        floor = _FLOOR * float(prefix[-1, :3] @ np.array(LUMINANCE)) / 4
-        counts = np.zeros(len(todo), np.int64)
+        sources = store.sources()
+        enough = self._glossy[points] | ~glossy[points]
+        fresh = (self._stamp[points] == sources.stamp[points]) & enough
+        changed = points[~fresh]
+        partly = sources.row[changed] > 0
+        partly &= (self._stamp[changed] == sources.exact_stamp[changed]) & enough[~fresh]
+        partly &= (sources.exact_stamp[changed] > 0) & ~_mostly(sources, mesh, changed)
+        whole, rest = changed[~partly], changed[partly]
+        if len(whole):
+            self._sum(gather_light, self.table, sources, mesh, whole, glossy, (), job)
+            self._stamp[whole] = sources.stamp[whole]
+            self._glossy[whole] = glossy[whole]
+        if len(rest) or self.difference.blocks:
+            self.difference = self.difference.resized(len(self.table))
+        if len(rest):
+            known = (self.table.irradiance,)
+            self._sum(gather_difference, self.difference, sources, mesh, rest, glossy, known, job)
+        return len(changed)
+
+    def _sum(
+        self,
+        kernel: Callable[..., int],
+        table: NodeTable,
+        sources: Sources,
+        mesh: WorldMesh,
+        points: I64,
+        glossy: Bools,
+        known: tuple[npt.NDArray[Any], ...],
+        job: Job,
+    ) -> None:
+        prefix = self._prefix
+        assert prefix is not None
+        floor = _FLOOR * prefix.power / 4
+        counts = np.zeros(len(points), np.int64)
         found: dict[int, NodeBlock] = {}
 
         def body(begin: int, stop: int) -> None:
             while begin < stop:
-                out = np.empty(FLOATS * (MOST_NODES + 384 * (stop - begin)), np.float32)
-                done = gather_light(
+                out = np.empty(FLOATS * (MOST_NODES + _ROOM * (stop - begin)), np.float32)
+                done = kernel(
                     begin,
                     stop,
-                    todo,
+                    points,
                     mesh.normals,
+                    mesh.object,
                     glossy,
-                    store.alive,
-                    store.pool,
-                    start,
-                    length,
-                    prefix,
-                    tolerance,
+                    sources.pool,
+                    sources.start,
+                    sources.length,
+                    sources.coarse_pool,
+                    sources.coarse_start,
+                    sources.coarse_length,
+                    sources.row,
+                    sources.skip,
+                    prefix.block,
+                    prefix.leaf,
+                    self._tolerance,
                     floor,
-                    self.table.irradiance,
+                    *known,
+                    table.irradiance,
                     out,
                     counts,
                 )
                 first = np.concatenate([[0], np.cumsum(counts[begin : begin + done])]).astype(np.int64)
                 data = out[: FLOATS * int(first[-1])].copy()
-                found[begin] = NodeBlock(todo[begin : begin + done], first, data)
+                found[begin] = NodeBlock(points[begin : begin + done], first, data)
                 begin += done
 
-        self._workers.run(len(todo), CHUNK, body, job)
-        self.table.replace([found[begin] for begin in sorted(found)])
-        self._stamp[todo] = stamp[todo]
-        self._glossy[todo] = glossy[todo]
-        self.gathered += len(todo)
-        return len(todo)
+        self._workers.run(len(points), CHUNK, body, job)
+        table.replace([found[begin] for begin in sorted(found)])
+
+
+def _mostly(sources: Sources, mesh: WorldMesh, points: I64) -> Bools:
+    """Points of whose record so much is out of date that a difference saves nothing."""
+    stale = (sources.skip & ~sources.skip[:1]).sum(axis=2)
+    many = stale > np.maximum(sources.skip.shape[1] // 2, 1)
+    return np.asarray(many[sources.row[points], mesh.object[points]])

@@ -92,7 +92,7 @@ class VisibilityStage:
             self._look(points, job)
         else:
             unknown = store.unknown(points)
-            if len(unknown) and job.listened_to and not store.seen(unknown).any():
+            if len(unknown) and job.listened_to and store.unseen(unknown):
                 for level in FIRST_LEVELS:
                     if level < k:
                         store.preview(points, level, job)
@@ -127,6 +127,7 @@ class Arriving:
     """The light of every layer at the vertices: tables of nodes, which change in place."""
 
     layers: tuple[tuple[NodeId, tuple[NodeTable, ...]], ...]
+    newest: tuple[int, ...]
     summed: int
     lamp_points: int
 
@@ -154,9 +155,7 @@ class LightStage:
         lobes = self._lobes(inputs[Shapes])
         by_material = np.array([not lobe.flat for lobe in lobes] + [False], np.bool_)
         glossy = by_material[mesh.material]
-        layers: list[tuple[NodeId, tuple[NodeTable, ...]]] = []
         summed = looked = 0
-        before = [table.newest for _, tables in self._tables() for table in tables]
         if lighting.environment is not None and lighting.tree is not None:
             tree = fitted(lighting.tree, seen.store.k)
             self._environment.follow(seen.store, tree, wanted.tolerance)
@@ -180,21 +179,19 @@ class LightStage:
                 coarse if frame.moving else None,
                 job,
             )
-        layers = self._tables(lighting)
-        after = [table.newest for _, tables in layers for table in tables]
+        layers = tuple(self._tables(lighting))
+        newest = tuple(table.newest for _, tables in layers for table in tables)
         previous: Arriving | None = inputs.previous
-        if previous is not None and before == after and _same(previous.layers, layers) and not summed:
+        if previous is not None and previous.newest == newest and _same(previous.layers, layers):
             return previous
-        return Arriving(tuple(layers), summed, looked)
+        return Arriving(layers, newest, summed, looked)
 
-    def _tables(self, lighting: Lighting | None = None) -> list[tuple[NodeId, tuple[NodeTable, ...]]]:
+    def _tables(self, lighting: Lighting) -> list[tuple[NodeId, tuple[NodeTable, ...]]]:
         made: list[tuple[NodeId, tuple[NodeTable, ...]]] = []
-        if lighting is None:
-            return [("", (self._environment.table, *(cache.table for cache in self._lamps.values())))]
         if lighting.environment is not None:
             node = lighting.environment.id
             suns = (self._lamps[node].table,) if node in self._lamps else ()
-            made.append((node, (self._environment.table, *suns)))
+            made.append((node, (self._environment.table, self._environment.difference, *suns)))
         made.extend((lamp.node, (self._lamps[lamp.node].table,)) for lamp in lighting.lamps)
         return made
 

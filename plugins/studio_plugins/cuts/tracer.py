@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from studio_core.jit import call_address, kernel
 from studio_core.kernels.packets import DIRECTION, MASK, OPAQUE, ORIGIN, TFAR, new_packet
-from studio_plugins.cuts.intervals import ONES, U64, Pool, runs_of
+from studio_plugins.cuts.intervals import ONES, U64, Pool, runs_of, set_bits
 
 F32 = npt.NDArray[np.float32]
 F64 = npt.NDArray[np.float64]
@@ -203,7 +203,6 @@ def trace_records(
     inset: F32,
     object_of: I32,
     slots: I64,
-    alive: Bools,
     pool: Pool,
     start: I64,
     length: I32,
@@ -220,16 +219,22 @@ def trace_records(
     sine: F32,
     offset: I64,
     shift: int,
+    slot_count: int,
+    whole: bool,
     out: Pool,
     out_length: I32,
     changed: Bools,
+    used: I64,
     counts: I64,
 ) -> int:
-    """Writes new records of points[begin:stop] one after the other into `out`; how many points fitted.
+    """Writes the records of points[begin:stop] that change one after the other into `out`.
+
+    Returns how many points fitted; used[0] is how many numbers they took.
 
     stale[stale_row[p], r, j] says that what object r's vertices know of object j must be traced again; the
-    rest is copied from the old record pool[start:start + length]. One ray stands for 2^shift leaves.
-    `changed` marks points whose record differs; `counts` (COUNTS,) is added to.
+    rest is copied from the old record pool[start:start + length] when the record is to be `whole`, or left
+    out. One ray stands for 2^shift leaves.
+    `changed` marks points whose record differs (without one, all); `counts` (COUNTS,) is added to.
     """
     packets = rows.shape[1]
     count = len(scene)
@@ -238,7 +243,7 @@ def trace_records(
     packet.view(np.uint32)[MASK, :] = OPAQUE
     hidden = np.empty(groups, np.uint64)
     words = np.empty(groups, np.uint64)
-    where = np.full(len(alive), -1, np.int64)
+    where = np.full(slot_count, -1, np.int64)
     planes = np.empty((6, 3))
     room = (8 * packets << shift) + 4
     place = 0
@@ -252,7 +257,7 @@ def trace_records(
             where[pool[at]] = at
             at += 2 + 2 * int(pool[at + 1])
         first = place
-        differs = False
+        differs = length[p] == 0
         full = False
         nx, ny, nz = normals[p, 0], normals[p, 1], normals[p, 2]
         ox = float(positions[p, 0]) + epsilon * geometric[p, 0] + inset[p, 0]
@@ -270,7 +275,7 @@ def trace_records(
                 full = True
                 break
             if not stale[stale_row[number], r, j]:
-                if known >= 0:
+                if known >= 0 and whole:
                     out[place : place + known_length] = pool[known : known + known_length]
                     place += known_length
                 if j == r:
@@ -280,7 +285,7 @@ def trace_records(
                             low = (int(pool[pair]) + (1 << shift) - 1) >> shift
                             high = ((int(pool[pair + 1]) + 1) >> shift) - 1
                             if high >= low:
-                                _set(hidden, low, high)
+                                set_bits(hidden, low, high)
                 continue
             counts[TRACED] += 1
             if j == r:
@@ -341,22 +346,11 @@ def trace_records(
             where[pool[at]] = -1
             at += 2 + 2 * int(pool[at + 1])
         if full:
+            used[0] = first
             return number - begin
+        if not differs:
+            place = first
         out_length[number] = place - first
         changed[number] = differs
+    used[0] = place
     return stop - begin
-
-
-@kernel
-def _set(words: U64, first: int, last: int) -> None:
-    """Sets the bits first … last."""
-    w, end = first >> 6, last >> 6
-    head = ONES << np.uint64(first & 63)
-    tail = ONES >> np.uint64(63 - (last & 63))
-    if w == end:
-        words[w] |= head & tail
-        return
-    words[w] |= head
-    for between in range(w + 1, end):
-        words[between] = ONES
-    words[end] |= tail

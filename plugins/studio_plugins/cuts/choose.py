@@ -1,0 +1,166 @@
+"""Nodes for the light of some intervals of leaves: which are enough, and what each stands for.
+
+Top-down: a node of the tree is split while the *visible light* in it, its irradiance times its spread
+1 − |Σ L ω| / Σ L, is more than what is allowed; it then stands for its light at the light's centroid. So
+the first-order error of a smooth BRDF vanishes in every node, and irradiance is exact for any cut.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from studio_core.colour import LUMINANCE
+from studio_core.jit import kernel
+from studio_core.kernels.light_tree import LightTree
+from studio_plugins.cuts.intervals import Pool
+
+F32 = npt.NDArray[np.float32]
+F64 = npt.NDArray[np.float64]
+I64 = npt.NDArray[np.int64]
+
+SUMS = 16
+"""Columns: power and vector (p, x, y, z) of luminance, red, green and blue: one line of the cache."""
+DEEPEST = 20
+MOST_NODES = 2048
+BLOCK = 64
+
+
+@dataclass(frozen=True, eq=False)
+class Prefix:
+    """Sums over the leaves before each, in two parts that add up.
+
+    block (S/64 + 1, 16) float64 up to each block of 64 leaves, leaf (S + 1, 16) float32 from there on: half
+    the memory of one table, and as exact, since that part is small. A vertex' sums may then be float32.
+    """
+
+    block: F64
+    leaf: F32
+
+    @staticmethod
+    def of(tree: LightTree) -> Prefix:
+        """The sums of a light tree."""
+        rows = np.empty((len(tree.prefix_power), 4, 4))
+        rows[:, 1:, 0], rows[:, 1:, 1:] = tree.prefix_power, tree.prefix_vector
+        rows[:, 0] = np.einsum("scx,c->sx", rows[:, 1:], np.array(LUMINANCE))
+        table = rows.reshape(-1, SUMS)
+        block = np.ascontiguousarray(table[::BLOCK])
+        leaf = (table - np.repeat(block, BLOCK, axis=0)[: len(table)]).astype(np.float32)
+        return Prefix(block, leaf)
+
+    @property
+    def power(self) -> float:
+        """Luminance of ∫ L dω over the whole sphere."""
+        return float(self.block[-1, 0] + self.leaf[-1, 0])
+
+
+@kernel
+def accumulate(runs: Pool, count: int, block: F64, leaf: F32, before: F32) -> None:
+    """before[j] (16,) becomes the sums over the runs before j, for j = 0 … count."""
+    for i in range(SUMS):
+        before[0, i] = np.float32(0)
+    for run in range(count):
+        start, stop = int(runs[2 * run]), int(runs[2 * run + 1]) + 1
+        for i in range(SUMS):
+            before[run + 1, i] = before[run, i] + (leaf[stop, i] - leaf[start, i])
+        first, last = start // BLOCK, stop // BLOCK
+        if first != last:
+            for i in range(SUMS):
+                before[run + 1, i] += np.float32(block[last, i] - block[first, i])
+
+
+@kernel
+def sums_until(
+    place: int, runs: Pool, first: int, last: int, before: F32, block: F64, leaf: F32, out: F32
+) -> int:
+    """out (16,) becomes the sums over the runs' leaves before `place`.
+
+    Returns the first of the runs first … last − 1 that ends at or after it, or `last`.
+    """
+    low, high = first, last
+    while low < high:
+        between = (low + high) >> 1
+        if int(runs[2 * between + 1]) < place:
+            low = between + 1
+        else:
+            high = between
+    for i in range(SUMS):
+        out[i] = before[low, i]
+    if low < last:
+        start = int(runs[2 * low])
+        if start < place:
+            for i in range(SUMS):
+                out[i] += leaf[place, i] - leaf[start, i]
+            one, other = start // BLOCK, place // BLOCK
+            if one != other:
+                for i in range(SUMS):
+                    out[i] += np.float32(block[other, i] - block[one, i])
+    return low
+
+
+@kernel
+def choose_nodes(
+    runs: Pool,
+    count: int,
+    block: F64,
+    leaf: F32,
+    before: F32,
+    nx: np.float32,
+    ny: np.float32,
+    nz: np.float32,
+    axes: F64,
+    allowed: np.float32,
+    sign: np.float32,
+    made: F32,
+    found: int,
+) -> int:
+    """Writes nodes as rows of made (MOST_NODES, 6) from `found` on; where they end.
+
+    n is the vertex' normal, axes its shading frame; colours are multiplied by `sign`.
+    """
+    stack_size, stack_run = np.empty(DEEPEST, np.int64), np.empty(DEEPEST, np.int64)
+    stack = np.empty((DEEPEST, SUMS), np.float32)  # sums up to the end of each waiting node
+    low = np.zeros(SUMS, np.float32)  # and up to the beginning of the current one
+    here = np.empty(SUMS, np.float32)
+    least = np.float32(1e-6) * before[count, 0]
+    low_run = 0
+    place = 0
+    depth = 0
+    stack_size[0], stack_run[0] = len(leaf) - 1, count
+    for i in range(SUMS):
+        stack[0, i] = before[count, i]
+    # Depth first from the left.
+    while depth >= 0:
+        size, high_run = stack_size[depth], stack_run[depth]
+        power = stack[depth, 0] - low[0]
+        mx, my, mz = stack[depth, 1] - low[1], stack[depth, 2] - low[2], stack[depth, 3] - low[3]
+        arrives = nx * mx + ny * my + nz * mz
+        if power > least and arrives > 0:
+            moment = np.float32(np.sqrt(mx * mx + my * my + mz * mz))
+            if arrives * (power - moment) > allowed * power and size > 1 and found + depth + 2 < MOST_NODES:
+                half = size >> 1
+                stack_size[depth] = half
+                depth += 1
+                run = sums_until(place + half, runs, low_run, high_run, before, block, leaf, stack[depth])
+                stack_size[depth], stack_run[depth] = half, min(run + 1, high_run)
+                continue
+            for i in range(SUMS):
+                here[i] = stack[depth, i] - low[i]
+            scale = np.float32(1) / moment
+            dx, dy, dz = mx * scale, my * scale, mz * scale
+            made[found, 0] = axes[0, 0] * dx + axes[0, 1] * dy + axes[0, 2] * dz
+            made[found, 1] = axes[1, 0] * dx + axes[1, 1] * dy + axes[1, 2] * dz
+            made[found, 2] = axes[2, 0] * dx + axes[2, 1] * dy + axes[2, 2] * dz
+            made[found, 3] = sign * max(nx * here[5] + ny * here[6] + nz * here[7], np.float32(0))
+            made[found, 4] = sign * max(nx * here[9] + ny * here[10] + nz * here[11], np.float32(0))
+            made[found, 5] = sign * max(nx * here[13] + ny * here[14] + nz * here[15], np.float32(0))
+            found += 1
+        place += size
+        for i in range(SUMS):
+            low[i] = stack[depth, i]
+        while low_run < high_run and int(runs[2 * low_run + 1]) < place:
+            low_run += 1
+        depth -= 1
+    return found
