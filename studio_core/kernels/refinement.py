@@ -8,6 +8,7 @@ import numpy.typing as npt
 from studio_core.jit import kernel
 
 F32 = npt.NDArray[np.float32]
+F64 = npt.NDArray[np.float64]
 I32 = npt.NDArray[np.int32]
 I64 = npt.NDArray[np.int64]
 Bools = npt.NDArray[np.bool_]
@@ -80,3 +81,15 @@ def prolong(between: I64, known: Bools, values: F32) -> None:
         if not known[i] and between[i, 0] != between[i, 1]:
             for c in range(values.shape[1]):
                 values[i, c] = np.float32(0.5) * (values[between[i, 0], c] + values[between[i, 1], c])
+
+
+@kernel
+def lift(between: I64, mass: F64) -> None:
+    """Mass (V,) of the vertices' hat functions on the refined mesh to that of the meshes they were made on.
+
+    The hat of a coarser mesh is that of the finer one and half of those in the middle of its edges.
+    """
+    for i in range(len(between) - 1, -1, -1):
+        if between[i, 0] != between[i, 1]:
+            mass[between[i, 0]] += 0.5 * mass[i]
+            mass[between[i, 1]] += 0.5 * mass[i]

@@ -22,6 +22,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from studio_core.kernels.refinement import lift
 from studio_core.scene.shading_mesh import NO_BACK
 from studio_core.scene.topology import edges
 from studio_core.scene.transform import rotation_matrix
@@ -35,6 +36,7 @@ I64 = npt.NDArray[np.int64]
 Bools = npt.NDArray[np.bool_]
 
 BUMP = 8 / 45  # mean square of 4 λ_i λ_j over a face
+HAT = 1 / 2  # mean square of a hat function over its mean
 STEP = 0.5
 SMOOTH = 1 / 6
 
@@ -119,13 +121,16 @@ def edge_errors(mesh: WorldMesh, hits: Hits, radiance: F32, valid: Bools) -> Edg
 
 
 def squares_saved(mesh: WorldMesh, hits: Hits, radiance: F32, valid: Bools) -> F64:
-    """(V,) what interpolation would miss at the samples around a vertex if refinement had not made it."""
+    """(V,) the summed squares that interpolation would miss if refinement had not made a vertex."""
     samples = seen_samples(hits, len(mesh.faces))
     faces = np.flatnonzero(samples)
     corners = seen_corners(mesh, hits.view, faces)
-    weight = np.bincount(corners.reshape(-1), np.repeat(samples[faces], 3), minlength=len(mesh))
-    told = surpluses(radiance, valid, parents(mesh))
-    return np.asarray(BUMP * weight * np.where(np.isfinite(told), told, 0) ** 2)
+    shares = np.repeat(samples[faces] / 3, 3)
+    mass: F64 = np.bincount(corners.reshape(-1), shares, minlength=len(mesh)).astype(np.float64)
+    between = parents(mesh)
+    lift(between, mass)
+    told = surpluses(radiance, valid, between)
+    return np.asarray(HAT * mass * np.where(np.isfinite(told), told, 0) ** 2)
 
 
 def _size(difference: npt.NDArray[np.floating]) -> F64:

@@ -38,8 +38,8 @@ F32 = npt.NDArray[np.float32]
 F64 = npt.NDArray[np.float64]
 I64 = npt.NDArray[np.int64]
 CHUNK = 1 << 15
-LEFT = 0.25  # share of the target's square that edges which are not split may add up to
-WORTH = 0.1  # share of all squares that a round must hope to take away
+LEFT = 0.5  # share of the target's square that edges which are not split may add up to
+WORTH = 0.1  # share of all squares, and of the edges to split, that a round must be able to take on
 LOSS = 0.1  # share of the target's square that may be lost when refinement is dropped
 
 
@@ -144,7 +144,8 @@ class AdaptiveSurfaceStage(SurfaceStage):
             return True
         edges = _worst(errors, adaptive) if rounds < adaptive.rounds else np.zeros(0, np.int64)
         room = self._room(surfaces, errors, adaptive)
-        proposed = self._split(surfaces, errors.ends[edges], room, job) if len(edges) and room > 0 else None
+        worth = len(edges) > 0 and room > WORTH * len(edges)
+        proposed = self._split(surfaces, errors.ends[edges], room, job) if worth else None
         self.reports.append(RoundReport(errors.relative_rmse, len(surfaces.mesh), len(edges)))
         self._proposed = proposed
         return proposed is not None

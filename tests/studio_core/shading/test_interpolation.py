@@ -143,12 +143,38 @@ def test_surpluses_and_what_they_saved() -> None:
     valid[between[new[0], 0]] = False
     assert np.isinf(surpluses(radiance, valid, between)[new[0]])
     valid[:] = True
-    view = hits(np.arange(len(mesh.faces)))
+    saved = squares_saved(mesh, hits(np.arange(len(mesh.faces))), radiance, valid)
     around = (seen_corners(mesh, VIEW, np.arange(len(mesh.faces))) == new[0]).any(axis=1).sum()
-    saved = squares_saved(mesh, view, radiance, valid)
-    if around:
-        close(saved[new[0]], 8 / 45 * around * 0.25 / 3)
+    close(saved[new[0]], 0.25 / 3 * around / 6)
     assert np.delete(saved, new[0]).sum() == 0
+
+
+def test_what_early_vertices_saved_does_not_shrink_with_their_faces() -> None:
+    """A ridge that the first round found: further rounds that find nothing new save nothing."""
+    mesh = world(3.0, shapes=(floor(),))
+    saved = []
+    for _ in range(4):
+        mesh = mesh.with_mesh(
+            0, refine(mesh.objects[0].mesh, faces=np.arange(len(mesh.objects[0].mesh.faces)))
+        )
+        between = parents(mesh)
+        radiance = np.ones((len(mesh), 3), np.float32)
+        if not saved:
+            top = int(np.flatnonzero((between[:, 0] != between[:, 1]) & (mesh.side > 0))[0])
+        radiance[top] = 2.0
+        for k in np.flatnonzero(between[:, 0] != between[:, 1]):
+            if k != top:
+                radiance[k] = radiance[between[k]].mean(axis=0)
+        area = np.linalg.norm(
+            np.cross(*np.moveaxis(np.diff(mesh.positions[mesh.faces], axis=1), 1, 0)), axis=1
+        )
+        count = np.rint(area / area.sum() * 4096).astype(int)
+        seen = hits(np.repeat(np.arange(len(area)), count))
+        saved.append(squares_saved(mesh, seen, radiance, np.ones(len(mesh), np.bool_))[top])
+        shown = radiance[mesh.faces, 0].astype(np.float64) - 1
+        mean = (shown.sum(axis=1) ** 2 + (shown**2).sum(axis=1)) / 12
+        assert saved[-1] == pytest.approx((mean * count).sum(), rel=0.05)
+    close(saved, np.full(4, saved[0]))
 
 
 def test_lengths_in_the_picture() -> None:
