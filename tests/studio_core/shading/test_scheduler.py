@@ -15,7 +15,7 @@ from random import Random
 from typing import Any
 
 import pytest
-from counting_stages import Picture, Stage, counting_stages, from_scratch
+from counting_stages import DetailStage, Picture, Stage, counting_stages, from_scratch, refining_stages
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from random_edits import random_edit
@@ -58,9 +58,11 @@ class ManualExecutor:
 class Bench:
     """A scheduler over a scene that is edited; remembers everything that it says."""
 
-    def __init__(self, executor: Any = None, post: Any = lambda call: call()) -> None:
+    def __init__(
+        self, executor: Any = None, post: Any = lambda call: call(), stages: list[Stage] | None = None
+    ) -> None:
         self.executor = executor or ManualExecutor()
-        self.stages = counting_stages()
+        self.stages = stages or counting_stages()
         self.scene, self.view = little_scene(), View()
         self.scheduler = Scheduler(Pipeline(self.stages), self.executor, post)
         self.shown: list[tuple[int, Any, bool]] = []
@@ -478,3 +480,63 @@ def test_an_empty_scene_is_a_scene() -> None:
     bench.request(Changes())
     bench.executor.drain()
     assert bench.shown == [(1, bench.truth(), True)]
+
+
+# ---------------------------------------------------------------- rounds of refinement
+
+
+def detail(bench: Bench) -> DetailStage:
+    return next(stage for stage in bench.stages if isinstance(stage, DetailStage))
+
+
+def test_of_all_rounds_only_the_last_is_final() -> None:
+    bench = Bench(stages=refining_stages())
+    bench.request(Changes())
+    bench.executor.drain()
+    assert [(picture[-1], final) for _, picture, final in bench.shown] == [
+        (0, False),
+        (1, False),
+        (2, False),
+        (3, True),
+    ]
+    assert bench.scheduler.finished_jobs == 1
+
+
+def test_who_looks_around_does_not_wait_for_rounds() -> None:
+    bench = Bench(stages=refining_stages())
+    stage = detail(bench)
+
+    def turn(running: Stage) -> None:
+        if bench.scheduler.pipeline.rounds == 2:
+            running.interrupt = lambda later: None
+            bench.view = dataclasses.replace(bench.view, fov=30.0)
+            bench.request(view_changed())
+
+    stage.interrupt = turn
+    bench.request(Changes())
+    bench.executor.drain()
+    assert bench.scheduler.cancelled_jobs == 1
+    assert [(revision, picture[-1], final) for revision, picture, final in bench.shown] == [
+        (1, 0, False),
+        (1, 1, False),
+        (2, 1, False),
+        (2, 2, False),
+        (2, 3, True),
+    ]
+    assert bench.shown[-1][1][:-1] == from_scratch(bench.scene, bench.view)
+
+
+def test_names_disturb_no_round() -> None:
+    bench = Bench(stages=refining_stages())
+    stage = detail(bench)
+
+    def rename(running: Stage) -> None:
+        if bench.scheduler.pipeline.rounds == 1:
+            running.interrupt = lambda later: None
+            bench.edit(edits.SetFields("cube", {"name": "Chest"}))
+
+    stage.interrupt = rename
+    bench.request(Changes())
+    bench.executor.drain()
+    assert bench.scheduler.cancelled_jobs == 0
+    assert [revision for revision, _, final in bench.shown if final] == [1, 2]
