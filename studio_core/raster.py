@@ -1,92 +1,62 @@
-"""Pictures without OpenGL: interpolated radiance at primary hits, textures and background per pixel."""
+"""Pictures without OpenGL: interpolated radiance at primary hits, textures and background per pixel.
+
+A picture is made of four things that change for different reasons, and each is kept until one of its own
+reasons changes: sides and texel density of faces (mesh, eye), what pixels see of objects (hits), the
+background (hits, environment), and the colours of vertices, which are all that another light or another
+BRDF costs.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
+from typing import Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
-from studio_core.contract import Registry, Services
-from studio_core.kernels.compose import background_samples, shade_samples
+from studio_core.arrays import readonly
+from studio_core.contract import Services
+from studio_core.kernels.background import background_hits
+from studio_core.kernels.compose import (
+    GENERAL,
+    RECORD,
+    add_light,
+    add_samples,
+    average,
+    face_texels,
+    hit_coefficients,
+    outline_pixels,
+    shade_hits,
+)
+from studio_core.kernels.facing import shown_sides
 from studio_core.parallel import Workers
 from studio_core.scene.diff import Aspect
-from studio_core.scene.nodes import Light, Scene
+from studio_core.scene.nodes import Environment, Light, Scene
+from studio_core.scene.transform import rotation_matrix
 from studio_core.session import View
 from studio_core.shading.artifacts import TERMS, Hits, Picture, Radiance, Surfaces
+from studio_core.shading.coefficients import Coefficients, CoefficientTable, Maps
 from studio_core.shading.frame import Frame
 from studio_core.shading.job import Job
 from studio_core.shading.lamps import shown_environment
-from studio_core.shading.materials import Resolved, coefficients, linear_rgb, resolve
+from studio_core.shading.materials import linear_rgb
 from studio_core.shading.pipeline import Inputs
-from studio_core.shading.primary import pinhole
+from studio_core.shading.primary import eye_in, pinhole
 
 F32 = npt.NDArray[np.float32]
+I32 = npt.NDArray[np.int32]
 I64 = npt.NDArray[np.int64]
+U32 = npt.NDArray[np.uint32]
 
-CHUNK = 1 << 15
+PIXELS = 1 << 12
+FACES = 1 << 13
+VERTICES = 1 << 13
+NONE = np.zeros(0, np.float32)
 EVERY = np.zeros(0, np.int64)
-_LEVELS = 12
-
-
-@dataclass(frozen=True)
-class Coefficients:
-    """BRDF coefficients of all materials, with mip levels where textured; see `kernels.compose`."""
-
-    table: F32
-    first: I64
-    size: I64
-    uv_scale: F32
-
-
-class CoefficientTable:
-    """Makes `Coefficients`, keeping the maps of materials that did not change."""
-
-    def __init__(self, registry: Registry) -> None:
-        self._registry = registry
-        self._kept: dict[str, tuple[object, list[F32], F32]] = {}
-
-    def __call__(self, scene: Scene, surfaces: Surfaces) -> Coefficients:
-        """The table for `surfaces.materials`."""
-        count = max(len(surfaces.materials), 1)
-        first, size = np.zeros((count, _LEVELS), np.int64), np.zeros((count, _LEVELS, 2), np.int64)
-        uv_scale = np.tile(np.array([1, 1, 0, 0], np.float32), (count, 1))
-        rows: list[F32] = []
-        length = 0
-        kept: dict[str, tuple[object, list[F32], F32]] = {}
-        for m, material_id in enumerate(surfaces.materials):
-            material = scene.material(material_id)
-            had = self._kept.get(material_id)
-            if had is None or had[0] is not material:
-                resolved = resolve(material, self._registry)
-                had = material, _pyramid(coefficients(resolved)), _uv_scale(resolved)
-            kept[material_id] = had
-            _, levels, uv_scale[m] = had
-            for level, values in enumerate(levels):
-                first[m, level], size[m, level] = length, values.shape[:2]
-                rows.append(values.reshape(-1, TERMS * 3))
-                length += len(rows[-1])
-        self._kept = kept
-        table = np.concatenate(rows) if rows else np.zeros((1, TERMS * 3), np.float32)
-        return Coefficients(table, first, size, uv_scale)
-
-
-def _pyramid(base: F32) -> list[F32]:
-    level = base.reshape(1, 1, TERMS, 3) if base.ndim == 2 else base
-    made = [np.ascontiguousarray(level)]
-    while max(level.shape[:2]) > 1 and len(made) < _LEVELS:
-        height, width = max(level.shape[0] // 2, 1), max(level.shape[1] // 2, 1)
-        y, x = level.shape[0] // height, level.shape[1] // width
-        cut = level[: height * y, : width * x].reshape(height, y, width, x, TERMS, 3)
-        level = cut.mean(axis=(1, 3), dtype=np.float32)
-        made.append(level)
-    return made
-
-
-def _uv_scale(resolved: Resolved) -> F32:
-    for texture in resolved.textures.values():
-        return np.array([*texture.scale, *texture.offset], np.float32)
-    return np.array([1, 1, 0, 0], np.float32)
+NO_COLOUR = np.zeros((0, 3), np.float32)
+T = TypeVar("T")
 
 
 class PictureStage:
@@ -97,123 +67,274 @@ class PictureStage:
     dirtied_by = Aspect.MATERIAL | Aspect.GAIN | Aspect.LIGHT | Aspect.VIEW
 
     def __init__(self, services: Services) -> None:
-        self._workers: Workers = services.workers
         self._coefficients = CoefficientTable(services.registry)
+        self._compositor = Compositor(services.workers)
 
     def run(self, frame: Frame, inputs: Inputs, job: Job) -> Picture:
-        """The picture; no light is summed here."""
-        table = self._coefficients(frame.scene, inputs[Surfaces])
-        return compose(frame.scene, inputs[Radiance], inputs[Hits], table, self._workers, job)
+        """The picture; no light is summed here. Radiance may come with hits of its own, on a finer mesh."""
+        radiance = inputs[Radiance]
+        hits = inputs[Hits] if radiance.hits is None else radiance.hits
+        table = self._coefficients(frame.scene, radiance.surfaces)
+        return self._compositor.picture(frame.scene, radiance, hits, table, job)
 
 
-def compose(
-    scene: Scene,
-    radiance: Radiance,
-    hits: Hits,
-    table: Coefficients,
-    workers: Workers,
-    job: Job | None = None,
-) -> Picture:
-    """Linear (H, W, 3) with the environment behind where it is to be seen."""
-    surfaces, view = radiance.surfaces, hits.view
-    samples = Compositor(scene, radiance, view, table, workers, job)(hits, EVERY)
-    n2 = hits.samples**2
-    shape = (view.height, view.width)
-    linear = samples.reshape(*shape, n2, 3).mean(axis=2, dtype=np.float32)
-    coverage = (hits.face >= 0).reshape(*shape, n2).mean(axis=2, dtype=np.float32)
-    node = np.full(shape, -1, np.int32)
-    face = hits.face.reshape(*shape, n2)[..., 0]
-    node[face >= 0] = surfaces.mesh.object[surfaces.mesh.faces[face[face >= 0], 0]]
-    distance = np.where(face >= 0, hits.distance.reshape(*shape, n2)[..., 0], np.inf).astype(np.float32)
-    return Picture(radiance, linear, coverage, node, distance)
+class Kept(Generic[T]):
+    """The last value, for as long as the very same objects are asked for."""
+
+    def __init__(self) -> None:
+        self._key: tuple[object, ...] | None = None
+        self._value: T | None = None
+
+    def __call__(self, make: Callable[[], T], *key: object) -> T:
+        """The value made from `key`; `make` is called where one of it is another object than last time."""
+        same = self._key is not None and all(a is b for a, b in zip(self._key, key, strict=True))
+        if not same or self._value is None:
+            self._key = self._value = None  # if making fails, nothing is kept
+            self._value = make()
+            self._key = key
+        return self._value
+
+
+@dataclass(frozen=True, eq=False)
+class _Layer:
+    """Hits, which samples of the picture they are (empty: all), and how much each counts (empty: fully)."""
+
+    hits: Hits
+    samples: I64
+    weight: F32
+
+
+@dataclass(frozen=True, eq=False)
+class _Outline:
+    coverage: F32
+    node: I32
+    distance: F32
+
+
+class _Faces(NamedTuple):
+    """What kernels ask of faces: corners on the side that is seen, height, texel density, material."""
+
+    shown: U32
+    height: F32
+    density: F32
+    material: I32
+
+
+class _Tables(NamedTuple):
+    """Colours of vertices and maps of materials; see `kernels.compose.shade_hits`."""
+
+    kind: I64
+    record: F32
+    sums: F32
+    texels: F32
+    tables: F32
+    first: I64
+    size: I64
+    levels: I64
+    uv_scale: F32
+    pixel_angle: float
 
 
 class Compositor:
-    """Radiance of samples; what lies behind transparent surfaces is mixed in by opacity."""
+    """Pictures and single hits from radiance at vertices. Owned by the compute thread."""
 
-    def __init__(
-        self,
-        scene: Scene,
-        radiance: Radiance,
-        view: View,
-        table: Coefficients,
-        workers: Workers,
-        job: Job | None,
-    ) -> None:
-        lights = {light.id: light for light in scene.of(Light) if scene.shown(light.id)}
+    def __init__(self, workers: Workers) -> None:
+        self._workers = workers
+        self._sides: Kept[tuple[U32, F32]] = Kept()
+        self._density: Kept[F32] = Kept()
+        self._layers: Kept[tuple[_Layer, ...]] = Kept()
+        self._outline: Kept[_Outline] = Kept()
+        self._background: Kept[F32] = Kept()
+        self._sky: Kept[F32] = Kept()
+
+    def picture(
+        self, scene: Scene, radiance: Radiance, hits: Hits, table: Coefficients, job: Job | None = None
+    ) -> Picture:
+        """Linear (H, W, 3) with the environment behind where it is to be seen."""
+        surfaces, mesh, view = radiance.surfaces, radiance.surfaces.mesh, hits.view
+        layers = self._layers(lambda: _layers(hits, surfaces), hits, surfaces.opacity, mesh.face_material)
+        outline = self._outline(lambda: self._look(hits, surfaces, job), hits, mesh.faces, mesh.object)
         environment = shown_environment(scene)
-        self.environment = environment if environment is not None and environment.background else None
-        self.surfaces = radiance.surfaces
-        self.terms = radiance.combined(lights).reshape(-1, TERMS * 3)
-        self.table = table
-        self.texels = texels_per_metre(self.surfaces, table)
-        self.pinhole = pinhole(view)
-        self.pixel_angle = float(2 * self.pinhole[3] / (view.height * view.antialias))
-        self.workers, self.job = workers, job
+        if environment is None or not environment.background:
+            background = NO_COLOUR
+        else:
+            shown = environment
+            background = self._background(lambda: self._behind(shown, layers, job), layers, shown)
+        faces = self._faces(surfaces, view, table.maps)
+        tables = self._tables(scene, radiance, table, view, job)
+        given = (hits.face, hits.u, hits.v, hits.distance, *faces, *tables)
+        alone = hits.samples == 1 and not hits.behind  # then the background fills what is not hit
 
-    def __call__(self, hits: Hits, samples: I64) -> F32:
-        """(N, 3) radiance of hits that belong to `samples` of the picture."""
-        out = np.zeros((len(hits.face), 3), np.float32)
-        self._background(hits, samples, out)
-        mesh, table = self.surfaces.mesh, self.table
+        def look(start: int, stop: int, values: F32) -> None:
+            shade_hits(start, stop, *given, background if alone else NO_COLOUR, values)
+
+        out = self._averaged(layers[0], view, look, NO_COLOUR if alone else background, job)
+        for layer in layers[1:]:
+            values = self._hits(layer.hits, faces, tables, job)
+            add_samples(layer.samples, hits.samples**2, layer.weight, values, out)
+        linear = out.reshape(view.height, view.width, 3)
+        return Picture(radiance, linear, outline.coverage, outline.node, outline.distance)
+
+    def radiance(
+        self, scene: Scene, radiance: Radiance, hits: Hits, table: Coefficients, job: Job | None = None
+    ) -> F32:
+        """(N, 3) of single hits, as they are shown; 0 where nothing is hit. Nothing is looked through."""
+        faces = self._faces(radiance.surfaces, hits.view, table.maps)
+        return self._hits(hits, faces, self._tables(scene, radiance, table, hits.view, job), job)
+
+    def coefficients(self, surfaces: Surfaces, hits: Hits, table: Coefficients) -> F32:
+        """(N, TERMS, 3) BRDF coefficients of hits on surfaces."""
+        maps, out = table.maps, np.zeros((len(hits.face), TERMS * 3), np.float32)
+        faces = (*self._faces(surfaces, hits.view, maps), surfaces.mesh.uvs)
+        looks = (maps.kind, table.plain, table.slope, maps.texels, maps.tables)
+        layout = (maps.first, maps.size, maps.levels, maps.uv_scale, _pixel_angle(hits.view))
+        given = (hits.face, hits.u, hits.v, hits.distance, *faces, *looks, *layout)
+        hit_coefficients(*given, out)
+        return out.reshape(-1, TERMS, 3)
+
+    def _hits(self, hits: Hits, faces: _Faces, tables: _Tables, job: Job | None) -> F32:
+        out = np.empty((len(hits.face), 3), np.float32)
+
+        given = (hits.face, hits.u, hits.v, hits.distance, *faces, *tables)
 
         def shade(start: int, stop: int) -> None:
-            shade_samples(
-                start,
-                stop,
-                hits.face,
-                hits.u,
-                hits.v,
-                hits.distance,
-                samples,
-                self.pinhole,
-                mesh.faces,
-                mesh.back_faces,
-                mesh.positions,
-                mesh.material,
-                mesh.uvs,
-                self.texels,
-                self.terms,
-                table.table,
-                table.first,
-                table.size,
-                table.uv_scale,
-                self.pixel_angle,
-                out,
-            )
+            shade_hits(start, stop, *given, NO_COLOUR, out[start:stop])
 
-        self.workers.run(len(hits.face), CHUNK, shade, self.job)
-        for index, rest in hits.behind:
-            under = self(rest, samples[index] if len(samples) else index)
-            slot = mesh.face_material[hits.face[index]]
-            alpha = self.surfaces.opacity[slot][:, None]
-            out[index] = alpha * out[index] + (1 - alpha) * under
+        self._workers.run(len(out), PIXELS, shade, job)
         return out
 
-    def _background(self, hits: Hits, samples: I64, out: F32) -> None:
-        if self.environment is None:
-            return
-        rotation = np.ascontiguousarray(self.environment.rotation().matrix()[:3, :3].T, np.float32)
-        pixels = linear_rgb(self.environment.image)
-        gain = np.array(self.environment.gain(), np.float32)
+    def _faces(self, surfaces: Surfaces, view: View, maps: Maps) -> _Faces:
+        mesh = surfaces.mesh
+        count = len(mesh.faces)
+
+        def sides() -> tuple[U32, F32]:
+            eye = eye_in(surfaces, view)
+            shown, height = np.empty((count, 3), np.uint32), np.empty(count, np.float32)
+
+            def look(start: int, stop: int) -> None:
+                shown_sides(start, stop, mesh.positions, mesh.faces, mesh.back_faces, eye, shown, height)
+
+            self._workers.run(count, FACES, look)
+            return shown, height
+
+        def density() -> F32:
+            out = np.empty(count, np.float32)
+            layout = (maps.kind, maps.size, maps.uv_scale)
+
+            def look(start: int, stop: int) -> None:
+                corners = (mesh.positions, mesh.uvs, mesh.faces, mesh.face_material)
+                face_texels(start, stop, *corners, *layout, out)
+
+            self._workers.run(count, FACES, look)
+            return out
+
+        shown, height = self._sides(sides, mesh, view)
+        return _Faces(shown, height, self._density(density, mesh, maps), mesh.face_material)
+
+    def _tables(
+        self, scene: Scene, radiance: Radiance, table: Coefficients, view: View, job: Job | None
+    ) -> _Tables:
+        mesh, maps = radiance.surfaces.mesh, table.maps
+        count = len(radiance.valid)
+        record = np.zeros((count, RECORD), np.float32)
+        record[:, 6:] = mesh.uvs
+        sums = np.zeros((count if (maps.kind == GENERAL).any() else 0, TERMS * 3), np.float32)
+        for node, layer in radiance.layers.items():
+            light = scene.nodes.get(node)
+            if not isinstance(light, Light) or not scene.shown(node):
+                continue
+            terms = np.ascontiguousarray(layer.terms, np.float32).reshape(count, TERMS * 3)
+            of_light = (terms, np.asarray(light.gain(), np.float32), radiance.valid)
+            given = (*of_light, mesh.material, maps.kind, table.plain, table.slope, record, sums)
+            self._workers.run(count, VERTICES, partial(_add_light, given), job)
+        layout = (maps.first, maps.size, maps.levels, maps.uv_scale)
+        return _Tables(maps.kind, record, sums, maps.texels, maps.tables, *layout, _pixel_angle(view))
+
+    def _look(self, hits: Hits, surfaces: Surfaces, job: Job | None) -> _Outline:
+        mesh, view = surfaces.mesh, hits.view
+        shape = (view.height, view.width)
+        coverage, distance = np.empty((2, *shape), np.float32)
+        node = np.empty(shape, np.int32)
+        flat = (coverage.reshape(-1), node.reshape(-1), distance.reshape(-1))
 
         def look(start: int, stop: int) -> None:
-            background_samples(start, stop, hits.face, samples, self.pinhole, rotation, pixels, gain, out)
+            rays = (hits.samples**2, hits.face, hits.distance, mesh.faces, mesh.object)
+            outline_pixels(start, stop, *rays, *flat)
 
-        self.workers.run(len(hits.face), CHUNK, look, self.job)
+        self._workers.run(node.size, PIXELS, look, job)
+        return _Outline(coverage, node, distance)
+
+    def _behind(self, environment: Environment, layers: tuple[_Layer, ...], job: Job | None) -> F32:
+        """(P, 3) what of the environment is seen beside objects and through them."""
+        view = layers[0].hits.view
+        lens = pinhole(view)
+        to_picture = environment.rotation().matrix()[:3, :3].T
+        turn = np.ascontiguousarray(to_picture @ rotation_matrix(view.transform.rotation), np.float32)
+        pixels = self._sky(lambda: readonly(linear_rgb(environment.image), np.float32), environment.image)
+        gain = np.array(environment.gain(), np.float32)
+        sky = (turn, pixels, gain)
+
+        def look(start: int, stop: int, values: F32) -> None:
+            background_hits(start, stop, lens, EVERY, layers[0].hits.face, *sky, values)
+
+        out = self._averaged(layers[0], view, look, NO_COLOUR, job)
+        for layer in layers[1:]:
+            values = np.empty((len(layer.samples), 3), np.float32)
+            background_hits(0, len(values), lens, layer.samples, layer.hits.face, *sky, values)
+            add_samples(layer.samples, layer.hits.samples**2, layer.weight, values, out)
+        return out
+
+    def _averaged(
+        self,
+        layer: _Layer,
+        view: View,
+        look: Callable[[int, int, F32], None],
+        background: F32,
+        job: Job | None,
+    ) -> F32:
+        """(P, 3) pixels whose samples `look` writes; background (P, 3), or nothing, is added."""
+        count = layer.hits.samples**2
+        out = np.empty((view.width * view.height, 3), np.float32)
+
+        def fill(start: int, stop: int) -> None:
+            if count == 1 and not len(layer.weight) and not len(background):
+                look(start, stop, out[start:stop])
+                return
+            first, last = start * count, stop * count
+            values = np.empty((last - first, 3), np.float32)
+            look(first, last, values)
+            average(count, values, layer.weight[first:last], background[start:stop], out[start:stop])
+
+        self._workers.run(len(out), PIXELS, fill, job)
+        return out
 
 
-def texels_per_metre(surfaces: Surfaces, table: Coefficients) -> F32:
-    """(F,) texels of the finest level along a metre of each face; 1 where nothing is textured."""
-    mesh = surfaces.mesh
-    if not (table.size[:, 0] > 1).any() or not len(mesh.faces):
-        return np.ones(max(len(mesh.faces), 1), np.float32)
-    corners, uvs = mesh.positions[mesh.faces].astype(np.float64), mesh.uvs[mesh.faces].astype(np.float64)
-    cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    area = np.linalg.norm(cross, axis=1)
-    a, b = uvs[:, 1] - uvs[:, 0], uvs[:, 2] - uvs[:, 0]
-    uv_area = np.abs(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
-    m = mesh.face_material
-    texels = uv_area * table.uv_scale[m, 0] * table.uv_scale[m, 1] * table.size[m, 0, 0] * table.size[m, 0, 1]
-    made: F32 = np.minimum(np.sqrt(np.abs(texels) / np.maximum(area, 1e-20)), 1e30).astype(np.float32)
-    return made
+def _add_light(given: tuple[Any, ...], start: int, stop: int) -> None:
+    add_light(start, stop, *given)
+
+
+def _pixel_angle(view: View) -> float:
+    """Radians between samples, about."""
+    return float(2 * np.tan(np.radians(view.fov) / 2) / (view.height * view.antialias))
+
+
+def _layers(hits: Hits, surfaces: Surfaces) -> tuple[_Layer, ...]:
+    """The hits and what is seen through them, each with what the surfaces before it let through."""
+    made: list[_Layer] = []
+
+    def add(layer: Hits, samples: I64, arrives: F32) -> None:
+        weight = arrives.copy()
+        if layer.behind and not len(weight):
+            weight = np.ones(len(layer.face), np.float32)
+        made.append(_Layer(layer, samples, weight))
+        for index, rest in layer.behind:
+            alpha = surfaces.opacity[surfaces.mesh.face_material[layer.face[index]]]
+            passed = weight[index] * (1 - alpha)
+            weight[index] *= alpha
+            add(rest, samples[index] if len(samples) else index, passed)
+
+    add(hits, EVERY, NONE)
+    return tuple(made)
+
+
+__all__ = ["CoefficientTable", "Coefficients", "Compositor", "PictureStage"]

@@ -24,7 +24,7 @@ EDGE_ON = 1e-5  # of the distance: both sides of such a face count as seen
 @kernel
 def plane_height(positions: F32, i: int, j: int, k: int, eye: F64) -> float:
     """Metres from the eye to the plane of a face along its normal; > 0: the eye is behind it, 0: no area."""
-    ax, ay, az = float(positions[i, 0]), float(positions[i, 1]), float(positions[i, 2])
+    ax, ay, az = np.float64(positions[i, 0]), np.float64(positions[i, 1]), np.float64(positions[i, 2])
     bx, by, bz = positions[j, 0] - ax, positions[j, 1] - ay, positions[j, 2] - az
     cx, cy, cz = positions[k, 0] - ax, positions[k, 1] - ay, positions[k, 2] - az
     nx, ny, nz = by * cz - bz * cy, bz * cx - bx * cz, bx * cy - by * cx

@@ -13,8 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from studio_core.contract import Services
-from studio_core.kernels.compose import shade_samples
-from studio_core.raster import Coefficients, CoefficientTable, Compositor, texels_per_metre
+from studio_core.raster import Coefficients, CoefficientTable, Compositor
 from studio_core.scene.nodes import Light, NodeId
 from studio_core.scene.shading_mesh import NO_BACK
 from studio_core.shading.artifacts import (
@@ -35,7 +34,6 @@ from studio_core.shading.brute_force import VisibilityBits, all_points, environm
 from studio_core.shading.frame import Frame
 from studio_core.shading.job import Job
 from studio_core.shading.pipeline import Pipeline
-from studio_core.shading.primary import pinhole
 
 F32 = npt.NDArray[np.float32]
 F64 = npt.NDArray[np.float64]
@@ -69,6 +67,7 @@ class ErrorMeter:
         self._workers = services.workers
         self._places = places  # where none are asked for
         self._coefficients = CoefficientTable(services.registry)
+        self._compositor = Compositor(services.workers)
 
     def __call__(
         self, pipeline: Pipeline, frame: Frame, job: Job, places: int | None = None
@@ -97,15 +96,17 @@ class ErrorMeter:
         chosen = np.sort(rng.choice(candidates, min(places, len(candidates)), replace=False))
         table = self._coefficients(frame.scene, surfaces)
         seen = _some(hits, chosen)
-        points, uvs = surface_points(surfaces, seen, frame)
+        points = surface_points(surfaces, seen, frame)
         truth = self._brute(points, shapes, lighting, casters, frame, job)
+        looks, lights = self._compositor.coefficients(surfaces, seen, table), _lights(frame)
         shown_layers, true_layers = {}, {}
         for layer in radiance.layers:
             one = dataclasses.replace(radiance, layers={layer: radiance.layers[layer]})
-            drawn = Compositor(frame.scene, one, hits.view, table, self._workers, job)(seen, chosen)
-            shown_layers[layer] = drawn
-            lit = dataclasses.replace(radiance, layers={layer: truth[layer]})
-            true_layers[layer] = _lit(frame, lit, seen, chosen, uvs, table)
+            shown_layers[layer] = self._compositor.radiance(frame.scene, one, seen, table, job)
+            lit = dataclasses.replace(
+                radiance, layers={layer: truth[layer]}, valid=np.ones(len(chosen), np.bool_)
+            )
+            true_layers[layer] = (lit.combined(lights) * looks).sum(axis=1)
         dark = np.zeros((len(chosen), 3), np.float32)
         shown, true = sum(shown_layers.values(), dark), sum(true_layers.values(), dark)
         by_layer = {k: compare(shown_layers[k], true_layers[k]) for k in shown_layers}
@@ -137,11 +138,11 @@ class ErrorMeter:
         )
         truth = self._brute(points, shapes, lighting, casters, frame, job)
         lights = _lights(frame)
-        first = table.table[table.first[mesh.material[some], 0]].reshape(-1, TERMS, 3)
-        shown = (radiance.combined(lights)[some] * first).sum(axis=1)
+        looks = table.typical[mesh.material[some]].reshape(-1, TERMS, 3)
+        shown = (radiance.combined(lights)[some] * looks).sum(axis=1)
         truth = {node: truth[node] for node in radiance.layers}
         exact = dataclasses.replace(radiance, layers=truth, valid=np.ones(len(some), np.bool_))
-        return compare(shown, (exact.combined(lights) * first).sum(axis=1))
+        return compare(shown, (exact.combined(lights) * looks).sum(axis=1))
 
     def _brute(
         self,
@@ -167,8 +168,8 @@ class ErrorMeter:
         return made
 
 
-def surface_points(surfaces: Surfaces, hits: Hits, frame: Frame) -> tuple[ChosenPoints, F32]:
-    """The true surface points of hits, with interpolated normals, and their uvs (N, 2)."""
+def surface_points(surfaces: Surfaces, hits: Hits, frame: Frame) -> ChosenPoints:
+    """The true surface points of hits, with interpolated normals."""
     mesh = surfaces.mesh
     corners = mesh.faces[hits.face]
     place = mesh.positions[corners].astype(np.float64)
@@ -181,7 +182,7 @@ def surface_points(surfaces: Surfaces, hits: Hits, frame: Frame) -> tuple[Chosen
     face_normal = np.where(turned[:, None], -face_normal, face_normal)
     weights = np.stack([1 - hits.u - hits.v, hits.u, hits.v], axis=1).astype(np.float64)
     normals = np.einsum("nk,nkc->nc", weights, mesh.normals[corners].astype(np.float64))
-    points = ChosenPoints(
+    return ChosenPoints(
         mesh.origin,
         np.einsum("nk,nkc->nc", weights, place).astype(np.float32),
         _unit(normals),
@@ -189,7 +190,6 @@ def surface_points(surfaces: Surfaces, hits: Hits, frame: Frame) -> tuple[Chosen
         np.zeros((len(corners), 3), np.float32),
         mesh.material[corners[:, 0]],
     )
-    return points, np.einsum("nk,nkc->nc", weights, mesh.uvs[corners]).astype(np.float32)
 
 
 def _unit(vectors: F64) -> F32:
@@ -205,44 +205,3 @@ def _some(hits: Hits, chosen: npt.NDArray[np.int64]) -> Hits:
 
 def _lights(frame: Frame) -> dict[NodeId, Light]:
     return {light.id: light for light in frame.scene.of(Light) if frame.scene.shown(light.id)}
-
-
-def _lit(
-    frame: Frame,
-    radiance: Radiance,
-    hits: Hits,
-    samples: npt.NDArray[np.int64],
-    uvs: F32,
-    table: Coefficients,
-) -> F32:
-    """(N, 3) radiance of hits whose own light sums are `radiance.layers`: each hit its own face."""
-    count, mesh = len(hits.face), radiance.surfaces.mesh
-    own = dataclasses.replace(radiance, valid=np.ones(count, np.bool_))
-    out = np.zeros((count, 3), np.float32)
-    corner = np.arange(3 * count, dtype=np.uint32).reshape(count, 3)
-    view = hits.view
-    lens = pinhole(view)
-    shade_samples(
-        0,
-        count,
-        np.arange(count, dtype=np.int32),
-        np.zeros(count, np.float32),
-        np.zeros(count, np.float32),
-        hits.distance,
-        samples,
-        lens,
-        corner,
-        np.full_like(corner, NO_BACK),
-        mesh.positions[mesh.faces[hits.face].ravel()],
-        np.repeat(mesh.face_material[hits.face], 3),
-        np.repeat(uvs, 3, axis=0),
-        texels_per_metre(radiance.surfaces, table)[hits.face],
-        np.repeat(own.combined(_lights(frame)).reshape(count, -1), 3, axis=0),
-        table.table,
-        table.first,
-        table.size,
-        table.uv_scale,
-        float(2 * lens[3] / (view.height * view.antialias)),
-        out,
-    )
-    return out

@@ -149,7 +149,8 @@ class PrimaryStage:
         hit = found.object >= 0
         face = np.where(hit, surfaces.mesh.face_offsets[found.object] + found.face, -1).astype(np.int32)
         distance = (found.t + gone).astype(np.float32)
-        rest = Hits(hits.view, hits.samples, face, found.u, found.v, distance)
+        u, v = np.ascontiguousarray(found.u), np.ascontiguousarray(found.v)
+        rest = Hits(hits.view, hits.samples, face, u, v, distance)
         rest = self._beyond(rest, clear, surfaces, caster, samples[through], lens, depth + 1, job)
         traced = hits.traced + len(through) + rest.traced
         return dataclasses.replace(hits, behind=((through, rest),), traced=traced)

@@ -8,42 +8,67 @@ from hypothesis import given
 from hypothesis import strategies as st
 from oracles.radiance import bilinear_repeat, lat_long
 
+from studio_core.kernels.background import angle, background_hits
 from studio_core.kernels.camera import sample_directions
-from studio_core.kernels.compose import background_samples, shade_samples, texel
+from studio_core.kernels.compose import (
+    AFFINE,
+    CONSTANT,
+    GENERAL,
+    RECORD,
+    add_light,
+    add_samples,
+    average,
+    face_texels,
+    shade_hits,
+    texel,
+)
 from studio_core.scene.transform import looking
 from studio_core.session import View
 from studio_core.shading.primary import pinhole
 
+NO_COLOUR = np.zeros((0, 3), np.float32)
 
-@given(
-    st.integers(1, 5), st.integers(1, 5), st.floats(-3, 3, allow_nan=False), st.floats(-3, 3, allow_nan=False)
-)
+
+@given(st.integers(1, 5), st.integers(1, 5), st.floats(0, 1, width=32), st.floats(0, 1, width=32))
 def test_texel_is_bilinear_and_repeats(height, width, u, v):
     rng = np.random.default_rng(height * 10 + width)
     map_ = rng.random((height, width, 9)).astype(np.float32)
     table = np.concatenate([np.zeros((3, 9), np.float32), map_.reshape(-1, 9)])
     out = np.empty(9, np.float32)
-    texel(table, 3, height, width, u, v, out)
+    texel(table, 3, height, width, np.float32(u), np.float32(v), out)
     np.testing.assert_allclose(out, bilinear_repeat(map_.astype(np.float64), u, v), atol=2e-5)
 
 
+@given(st.floats(-1, 1, width=32), st.floats(-1, 1, width=32))
+def test_angles_are_those_of_the_plane(y, x):
+    away = abs(float(angle(np.float32(y), np.float32(x))) - np.arctan2(y, x))
+    assert min(away, 2 * np.pi - away) < 4e-7 or max(abs(x), abs(y)) < 1e-20
+
+
+@pytest.mark.parametrize("antialias", [1, 2])
 @pytest.mark.parametrize("named", [False, True])
-def test_background_equals_the_oracle(named):
+def test_background_equals_the_oracle(named, antialias):
     rng = np.random.default_rng(1)
     pixels = rng.random((8, 16, 3)).astype(np.float32)
-    turn = np.linalg.qr(rng.normal(size=(3, 3)))[0].astype(np.float32)
+    turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
     gain = np.array([1, 2, 3], np.float32)
-    lens = pinhole(View(looking((0, 0, 0), (1, -2, 0.5)), fov=150, width=9, height=6, antialias=2))
-    samples = rng.permutation(9 * 6 * 4)[:50] if named else np.arange(9 * 6 * 4)
+    view = View(looking((0, 0, 0), (1, -2, 0.5)), fov=150, width=49, height=36, antialias=antialias)
+    count = 49 * 36 * antialias**2
+    samples = rng.permutation(count)[:700] if named else np.arange(count)
     directions = np.empty((len(samples), 3), np.float32)
-    sample_directions(lens, samples, directions)
+    sample_directions(pinhole(view), samples, directions)
     face = np.where(np.arange(len(samples)) % 5 == 0, 3, -1).astype(np.int32)
-    out = np.full((len(samples), 3), -1, np.float32)
-    given = samples if named else np.zeros(0, np.int64)
-    background_samples(0, len(samples), face, given, lens, turn, pixels, gain, out)
-    for d, f, made in zip(directions, face, out, strict=True):
-        expected = -1 if f >= 0 else lat_long(pixels, turn @ d) * gain
-        np.testing.assert_allclose(made, expected, atol=2e-3)
+    from_camera = (turn @ view.transform.matrix()[:3, :3]).astype(np.float32)
+    given_samples = samples if named else np.zeros(0, np.int64)
+    pieces = []
+    for start in range(0, len(samples), 613):  # as threads do
+        stop = min(start + 613, len(samples))
+        out = np.full((stop - start, 3), -1, np.float32)
+        background_hits(start, stop, pinhole(view), given_samples, face, from_camera, pixels, gain, out)
+        pieces.append(out)
+    for d, f, made in zip(directions, face, np.concatenate(pieces), strict=True):
+        expected = 0 if f >= 0 else lat_long(pixels, turn @ d) * gain
+        np.testing.assert_allclose(made, expected, atol=5e-5)
 
 
 def test_samples_are_ordered_by_pixel_and_lie_in_it():
@@ -61,64 +86,114 @@ def test_samples_are_ordered_by_pixel_and_lie_in_it():
     np.testing.assert_allclose(x.reshape(-1, 4).mean(axis=1) % 1, 0.5, atol=1e-4)
 
 
-def _one_triangle():
-    faces = np.array([[0, 1, 2]], np.uint32)
-    back = np.array([[3, 4, 5]], np.uint32)
-    places = np.tile(np.array([[0, 0, -1], [1, 0, -1], [0, 1, -1]], np.float32), (2, 1))
-    uvs = np.tile(np.array([[0, 0], [1, 0], [0, 1]], np.float32), (2, 1))
-    terms = np.arange(6 * 9, dtype=np.float32).reshape(6, 9)
-    return faces, back, places, np.zeros(6, np.int32), uvs, terms
+def _one_triangle(kind):
+    """Arguments of one triangle and its back with corners of its own, with three levels of a map."""
+    rng = np.random.default_rng(2)
+    uvs = np.array([[0, 0], [1, 0], [0, 1]])
+    record, sums = rng.random((6, RECORD)).astype(np.float32), rng.random((6, 9)).astype(np.float32)
+    record[:, 6:] = np.tile(uvs, (2, 1))
+    texels, tables = rng.random((21, 3)).astype(np.float32), rng.random((21, 9)).astype(np.float32)
+    first, size = np.array([[0, 16, 20]]), np.array([[[4, 4], [2, 2], [1, 1]]])
+    looks = (np.array([kind]), record, sums, texels, tables, first, size, np.array([3]))
+    return looks, np.array([[1, 1, 0, 0]], np.float32)
 
 
-def _shade(direction, table, first, size, *, face=0):
-    faces, back, places, material, uvs, terms = _one_triangle()
+def _shade(kind, face=0, corners=(0, 1, 2), distance=1.0, beside=NO_COLOUR):
+    looks, uv_scale = _one_triangle(kind)
     out = np.full((1, 3), -1, np.float32)
-    shade_samples(
+    shade_hits(
         0,
         1,
         np.array([face], np.int32),
         np.array([0.25], np.float32),
         np.array([0.5], np.float32),
-        np.array([1], np.float32),
-        np.zeros(0, np.int64),
-        pinhole(View(looking((0, 0, 0), direction), fov=1e-3, width=1, height=1, antialias=1)),
-        faces,
-        back,
-        places,
-        material,
-        uvs,
-        np.ones(1, np.float32),
-        terms,
-        table,
-        first,
-        size,
-        np.array([[1, 1, 0, 0]], np.float32),
+        np.array([distance], np.float32),
+        np.array([corners], np.uint32),
+        np.array([-distance], np.float32),  # met head-on
+        np.array([2.0], np.float32),
+        np.zeros(1, np.int32),
+        *looks,
+        uv_scale,
         0.01,
+        beside,
         out,
     )
     return out[0]
 
 
-def test_each_side_has_its_own_vertices_and_terms_add_up():
-    table = np.arange(9, dtype=np.float32)[None]
-    first, size = np.zeros((1, 1), np.int64), np.ones((1, 1, 2), np.int64)
-    weights = np.array([0.25, 0.25, 0.5])
-    terms = _one_triangle()[-1]
-    for direction, corners in (((0, 0, -1), terms[:3]), ((0, 0, 1), terms[3:])):
-        expected = (table[0] * (weights @ corners)).reshape(3, 3).sum(axis=0)
-        np.testing.assert_allclose(_shade(direction, table, first, size), expected, rtol=1e-6)
+@pytest.mark.parametrize("corners", [(0, 1, 2), (3, 4, 5)])
+@pytest.mark.parametrize(("distance", "level"), [(1.0, 0), (60.0, 0), (80.0, 1), (1e6, 2), (1e30, 2)])
+@pytest.mark.parametrize("kind", [CONSTANT, AFFINE, GENERAL])
+def test_a_hit_is_its_corners_times_its_texel(kind, distance, level, corners):
+    (_, record, sums, texels, tables, first, size, _), _ = _one_triangle(kind)
+    mixed = np.array([0.25, 0.25, 0.5]) @ record[list(corners)].astype(np.float64)
+    expected = mixed[:3]
+    rows, (height, width) = slice(first[0, level], None), size[0, level]
+    if kind == AFFINE:
+        map_ = texels[rows][: height * width].reshape(height, width, 3).astype(np.float64)
+        expected = mixed[:3] + mixed[3:6] * bilinear_repeat(map_, 0.25, 0.5)
+    elif kind == GENERAL:
+        map_ = tables[rows][: height * width].reshape(height, width, 9).astype(np.float64)
+        terms = np.array([0.25, 0.25, 0.5]) @ sums[list(corners)]
+        expected = mixed[:3] + (terms * bilinear_repeat(map_, 0.25, 0.5)).reshape(3, 3).sum(axis=0)
+    np.testing.assert_allclose(_shade(kind, 0, corners, distance), expected, rtol=1e-5)
 
 
-def test_nothing_is_written_where_nothing_is_hit():
-    table = np.ones((1, 9), np.float32)
-    first, size = np.zeros((1, 1), np.int64), np.ones((1, 1, 2), np.int64)
-    assert (_shade((0, 0, -1), table, first, size, face=-1) == -1).all()
+def test_what_is_not_hit_shows_what_lies_beside():
+    assert not _shade(CONSTANT, face=-1).any()
+    beside = np.array([[1, 2, 3]], np.float32)
+    assert _shade(CONSTANT, face=-1, beside=beside).tolist() == [1, 2, 3]
 
 
-def test_texture_is_read_at_the_interpolated_uv():
-    rng = np.random.default_rng(2)
-    map_ = rng.random((4, 4, 9)).astype(np.float32)
-    first, size = np.zeros((1, 1), np.int64), np.full((1, 1, 2), 4, np.int64)
-    terms = np.array([0.25, 0.25, 0.5]) @ _one_triangle()[-1][:3]
-    expected = (bilinear_repeat(map_.astype(np.float64), 0.25, 0.5) * terms).reshape(3, 3).sum(axis=0)
-    np.testing.assert_allclose(_shade((0, 0, -1), map_.reshape(-1, 9), first, size), expected, rtol=1e-5)
+@given(st.integers(0, 3))
+def test_light_is_added_term_by_term_where_it_was_computed(seed):
+    rng = np.random.default_rng(seed)
+    terms, gain = rng.random((2, 7, 9)).astype(np.float32), rng.random((2, 3)).astype(np.float32)
+    valid, material = rng.random(7) < 0.7, rng.integers(0, 3, 7).astype(np.int32)
+    kind = np.array([CONSTANT, AFFINE, GENERAL])
+    plain, slope = rng.random((2, 3, 9)).astype(np.float32)
+    record, sums = np.zeros((7, RECORD), np.float32), np.zeros((7, 9), np.float32)
+    for layer in range(2):
+        for start, stop in ((0, 4), (4, 7)):
+            add_light(
+                start, stop, terms[layer], gain[layer], valid, material, kind, plain, slope, record, sums
+            )
+    weighted = (terms.reshape(2, 7, 3, 3) * gain[:, None, None]).sum(axis=0) * valid[:, None, None]
+    for v, m in enumerate(material):
+        expected = (np.stack([plain[m], slope[m]]).reshape(2, 3, 3) * weighted[v]).sum(axis=1)
+        expected[1] *= kind[m] == AFFINE
+        np.testing.assert_allclose(record[v, :6].reshape(2, 3), expected * (kind[m] != GENERAL), rtol=1e-5)
+        np.testing.assert_allclose(sums[v], weighted[v].ravel() * (kind[m] == GENERAL), rtol=1e-5)
+
+
+@pytest.mark.parametrize("weighted", [False, True])
+@pytest.mark.parametrize("behind", [False, True])
+def test_pixels_are_means_of_their_samples(weighted, behind):
+    rng = np.random.default_rng(3)
+    values, background = rng.random((5 * 4, 3)).astype(np.float32), rng.random((5, 3)).astype(np.float32)
+    weight = rng.random(5 * 4).astype(np.float32)
+    expected = (values * (weight[:, None] if weighted else 1)).reshape(5, 4, 3).mean(axis=1)
+    expected = expected + (background if behind else 0)
+    out = np.empty((5, 3), np.float32)
+    average(4, values, weight if weighted else weight[:0], background if behind else NO_COLOUR, out)
+    np.testing.assert_allclose(out, expected, rtol=1e-6)
+    samples = np.array([3, 7, 0, 7])
+    add_samples(samples, 4, weight[:4], values[:4], out)
+    for n, sample in enumerate(samples):
+        expected[sample // 4] += weight[n] * values[n] / 4
+    np.testing.assert_allclose(out, expected, rtol=1e-6)
+
+
+def test_texels_along_a_metre_are_those_of_the_finest_level():
+    places = np.array([[0, 0, 0], [2, 0, 0], [0, 0.5, 0], [0, 0, 0]], np.float32)
+    uvs = np.array([[0, 0], [1, 0], [0, 1], [0.5, 0]], np.float32)
+    faces = np.array([[0, 1, 2], [0, 0, 1], [0, 1, 2], [0, 3, 2]], np.uint32)
+    material = np.array([0, 0, 1, 0], np.int32)
+    size, scale = np.array([[[32, 8]], [[0, 0]]]), np.array([[2, -3, 0, 0], [1, 1, 0, 0]], np.float32)
+    out = np.empty(4, np.float32)
+    for start, stop in ((0, 3), (3, 4)):
+        face_texels(start, stop, places, uvs, faces, material, np.array([AFFINE, CONSTANT]), size, scale, out)
+    # the whole map six times over on a rectangle of 2 × 0.5 m: 6 · 32 · 8 texels on one square metre
+    np.testing.assert_allclose(out[[0, 2]], [np.sqrt(6 * 32 * 8), 1], rtol=1e-6)
+    assert out[1] == 0
+    assert out[3] == pytest.approx(1e10 * np.sqrt(0.5 * 6 * 32 * 8))  # a face without area

@@ -8,11 +8,13 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from studio_core.kernels.compose import background_samples, shade_samples
+from studio_core.kernels.background import background_hits
+from studio_core.kernels.compose import AFFINE, CONSTANT, GENERAL, RECORD, face_texels, shade_hits
 from studio_core.kernels.directions import direction_set
+from studio_core.kernels.facing import shown_sides
 from studio_core.kernels.radiance import environment_terms, lamp_terms
 from studio_core.params import defaults
-from studio_core.scene.transform import looking
+from studio_core.scene.transform import looking, rotation_matrix
 from studio_core.session import View
 from studio_core.shading.artifacts import TERMS
 from studio_core.shading.primary import pinhole
@@ -98,29 +100,33 @@ COORDINATES = st.one_of(
     st.sampled_from([0.0, 1.0, 1e-30, -1e-30, 1e4, 3e38, -3e38]), st.floats(-1e5, 1e5, width=32)
 )
 TRIANGLES = st.lists(st.tuples(COORDINATES, COORDINATES, COORDINATES), min_size=3, max_size=3)
+KINDS = st.sampled_from([CONSTANT, AFFINE, GENERAL])
 UVS = st.lists(st.tuples(COORDINATES, COORDINATES), min_size=3, max_size=3)
 PIXELS = np.random.default_rng(0).random((9, 9)).astype(np.float32)
 
 
-@given(TRIANGLES, UVS, RADIANCE, st.floats(0, 1e30), st.sampled_from([0.0, 1e-6, 1.0, 1e30]))
+@given(TRIANGLES, UVS, RADIANCE, st.floats(0, 1e30), st.sampled_from([0.0, 1e-6, 1.0, 1e30]), KINDS)
 @QUICK
-def test_samples_of_any_triangle(corners, uvs, level, distance, texels):
-    faces = np.array([[0, 1, 2]], np.uint32)
+def test_samples_of_any_triangle(corners, uvs, level, distance, density, kind):
+    faces, place = np.array([[0, 1, 2]], np.uint32), np.array(corners, np.float32)
+    material, kinds = np.zeros(1, np.int32), np.array([kind])
+    shown, height, texels = np.empty((1, 3), np.uint32), np.empty(1, np.float32), np.empty(1, np.float32)
+    shown_sides(0, 1, place, faces, faces, np.array([1.0, 2.0, 3.0]), shown, height)
     first, size = np.array([[0, 4, 0, 0]]), np.array([[[2, 2], [1, 1], [0, 0], [0, 0]]])
-    table = np.concatenate([PIXELS[:4], PIXELS[4:5]])
-    terms = np.full((3, 9), level, np.float32)
-    out = np.zeros((1, 3), np.float32)
+    scale = np.array([[1, 1, 0, 0]], np.float32)
+    face_texels(0, 1, place, np.array(uvs, np.float32), faces, material, kinds, size, scale, texels)
+    assert np.isfinite(texels).all()
+    record = np.zeros((3, RECORD), np.float32)
+    record[:, :6], record[:, 6:] = level, uvs
+    sums, out = np.full((3, 9), level, np.float32), np.full((1, 3), -1, np.float32)
     hit = (np.zeros(1, np.int32), *np.array([[0.2], [0.3]], np.float32), np.array([distance], np.float32))
-    lens = pinhole(View(looking((0, 0, 0), (0.1, -0.3, -1)), width=1, height=1, antialias=1))
-    mesh = (faces, faces, np.array(corners, np.float32), np.zeros(3, np.int32), np.array(uvs, np.float32))
-    coefficients = (table, first, size, np.array([[1, 1, 0, 0]], np.float32))
-    shade_samples(
-        0, 1, *hit, np.zeros(0, np.int64), lens, *mesh, np.array([texels], np.float32), terms, *coefficients,
-        0.01, out,
-    )  # fmt: skip
-    assert np.isfinite(out).all()
-    assert (out >= 0).all()
-    assert (out <= 3.001 * level * PIXELS.max()).all()
+    for met in (texels, np.array([density], np.float32)):
+        given_faces = (shown, height, met, material)
+        maps = (kinds, record, sums, PIXELS[:5, :3].copy(), PIXELS[:5], first, size, np.array([2]), scale)
+        shade_hits(0, 1, *hit, *given_faces, *maps, 0.01, PIXELS[:0, :3], out)
+        assert np.isfinite(out).all()
+        assert (out >= 0).all()
+        assert (out <= 3.001 * level).all()
 
 
 @given(RADIANCE, st.floats(0.01, 179.9), st.tuples(*[st.floats(-1, 1)] * 3), st.integers(1, 4))
@@ -131,8 +137,8 @@ def test_background_of_any_view(level, fov, target, rows):
     pixels = (level * np.random.default_rng(rows).random((rows, 2 * rows, 3))).astype(np.float32)
     out = np.full((25, 3), -1, np.float32)
     nothing = np.full(25, -1, np.int32)
-    turn, gain = np.eye(3, dtype=np.float32), np.ones(3, np.float32)
-    background_samples(0, 25, nothing, np.zeros(0, np.int64), pinhole(view), turn, pixels, gain, out)
+    turn, gain = rotation_matrix(view.transform.rotation).astype(np.float32), np.ones(3, np.float32)
+    background_hits(0, 25, pinhole(view), np.zeros(0, np.int64), nothing, turn, pixels, gain, out)
     assert np.isfinite(out).all()
     assert (out >= 0).all()
     assert (out <= 1.0001 * pixels.max()).all()

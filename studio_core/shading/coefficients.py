@@ -1,0 +1,263 @@
+"""BRDF coefficients of a scene's materials as pixels want them, maps kept while their pictures stay.
+
+Where one texture acts, the coefficients of most models are affine in its texel: then only the picture is
+kept as a map, and another colour, roughness or metalness costs two rows of numbers. Whether they are is
+found out by asking the model along the range of the picture's values.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from studio_core.contract import Registry
+from studio_core.kernels.compose import AFFINE, CONSTANT, GENERAL
+from studio_core.params import Value
+from studio_core.scene.geometry import Image
+from studio_core.scene.nodes import Material, Scene
+from studio_core.shading.artifacts import TERMS, Surfaces
+from studio_core.shading.materials import Resolved, coefficients, linear_rgb, resolve
+
+F32 = npt.NDArray[np.float32]
+I64 = npt.NDArray[np.int64]
+
+LEVELS = 12
+PROBES = 33
+AFFINE_WITHIN = 1e-5  # of the largest coefficient
+WIDTH = TERMS * 3
+
+
+@dataclass(frozen=True, eq=False)
+class Maps:
+    """Mip levels of all textured materials (M); the same object while no map changes.
+
+    Level l < levels[m] of material m starts at row first[m, l] of texels (R, 3) or, where its coefficients
+    are not affine, of tables (R, TERMS·3), and has size[m, l] = (height, width). uv_scale (M, 4) is scale and
+    offset, kind (M,) says which, as in `kernels.compose`.
+    """
+
+    kind: I64
+    texels: F32
+    tables: F32
+    first: I64
+    size: I64
+    levels: I64
+    uv_scale: F32
+
+
+@dataclass(frozen=True, eq=False)
+class Coefficients:
+    """Coefficients (M, TERMS·3) are plain + slope · texel, or rows of a map; `typical` are their means."""
+
+    plain: F32
+    slope: F32
+    typical: F32
+    maps: Maps
+
+
+@dataclass(eq=False)
+class _Pyramid:
+    """Levels (h, w, C) from the finest, and the least and largest value of each channel.
+
+    Once stored, the levels are views of the one array that kernels read.
+    """
+
+    levels: tuple[F32, ...]
+    low: F32
+    high: F32
+
+
+@dataclass(frozen=True, eq=False)
+class _Look:
+    """What is known of one material."""
+
+    material: Material
+    kind: int
+    plain: F32
+    slope: F32
+    typical: F32
+    pyramid: _Pyramid | None
+    picture: tuple[str, bool] | None
+    uv_scale: F32
+
+
+class CoefficientTable:
+    """Makes `Coefficients`, keeping what belongs to materials and pictures that did not change."""
+
+    def __init__(self, registry: Registry) -> None:
+        self._registry = registry
+        self._looks: dict[str, _Look] = {}
+        self._pictures: dict[tuple[str, bool], _Pyramid] = {}
+        self._made: tuple[tuple[_Look, ...], Coefficients] | None = None
+        self._stored: dict[int, tuple[tuple[_Pyramid, ...], F32, list[int]]] = {}
+
+    def __call__(self, scene: Scene, surfaces: Surfaces) -> Coefficients:
+        """The table for `surfaces.materials`; the same object while none of them changes."""
+        looks: dict[str, _Look] = {}
+        pictures: dict[tuple[str, bool], _Pyramid] = {}
+        for name in surfaces.materials:
+            material, look = scene.material(name), self._looks.get(name)
+            if look is None or look.material is not material:
+                look = self._look(material, pictures)
+            elif look.picture is not None:
+                pictures[look.picture] = self._pictures[look.picture]
+            looks[name] = look
+        self._looks, self._pictures = looks, pictures
+        made = tuple(looks.values())
+        if self._made is None or self._made[0] != made:
+            self._made = made, self._assemble(made)
+        return self._made[1]
+
+    def _look(self, material: Material, pictures: dict[tuple[str, bool], _Pyramid]) -> _Look:
+        resolved = resolve(material, self._registry)
+        none = np.zeros(WIDTH, np.float32)
+        if not resolved.textures:
+            plain = coefficients(resolved).reshape(WIDTH)
+            return _Look(material, CONSTANT, plain, none, plain, None, None, _uv_scale(resolved))
+        if len(resolved.textures) == 1:
+            key = _picture_key(resolved)
+            found = pictures.get(key) or self._pictures.get(key)
+            if found is None:
+                found = _picture(next(iter(resolved.textures.values())).image, key[1])
+            line = _line(resolved, found)
+            if line is not None:
+                pictures[key] = found
+                plain, slope = line
+                mean = np.tile(found.levels[-1].mean(axis=(0, 1), dtype=np.float32), TERMS)
+                typical = plain + slope * mean
+                return _Look(material, AFFINE, plain, slope, typical, found, key, _uv_scale(resolved))
+        own = _pyramid(coefficients(resolved).reshape(*_map_size(resolved), WIDTH))
+        typical = own.levels[-1].mean(axis=(0, 1), dtype=np.float32)
+        return _Look(material, GENERAL, none, none, typical, own, None, _uv_scale(resolved))
+
+    def _assemble(self, looks: tuple[_Look, ...]) -> Coefficients:
+        count = max(len(looks), 1)
+        kind, first = np.zeros(count, np.int64), np.zeros((count, LEVELS), np.int64)
+        size, uv_scale = np.zeros((count, LEVELS, 2), np.int64), np.zeros((count, 4), np.float32)
+        plain, slope, typical = np.zeros((3, count, WIDTH), np.float32)
+        arrays = {}
+        for which, channels in ((AFFINE, 3), (GENERAL, WIDTH)):
+            used = dict.fromkeys(look.pyramid for look in looks if look.kind == which and look.pyramid)
+            arrays[which], starts = self._store(which, tuple(used), channels)
+            begin = dict(zip(used, starts, strict=True))
+            for m, look in enumerate(looks):
+                if look.kind != which or look.pyramid is None:
+                    continue
+                at = begin[look.pyramid]
+                for level, values in enumerate(look.pyramid.levels):
+                    first[m, level], size[m, level] = at, values.shape[:2]
+                    at += values.shape[0] * values.shape[1]
+        for m, look in enumerate(looks):
+            kind[m], uv_scale[m] = look.kind, look.uv_scale
+            plain[m], slope[m], typical[m] = look.plain, look.slope, look.typical
+        levels = (size[:, :, 0] > 0).sum(axis=1)
+        maps = Maps(kind, arrays[AFFINE], arrays[GENERAL], first, size, levels, uv_scale)
+        if self._made is not None and _same(maps, self._made[1].maps):
+            maps = self._made[1].maps
+        return Coefficients(plain, slope, typical, maps)
+
+    def _store(self, which: int, pyramids: tuple[_Pyramid, ...], channels: int) -> tuple[F32, list[int]]:
+        """All levels of some pyramids as rows, and where each pyramid starts; kept while they stay."""
+        kept = self._stored.get(which)
+        if kept is not None and kept[0] == pyramids:
+            return kept[1], kept[2]
+        rows = [level.reshape(-1, channels) for pyramid in pyramids for level in pyramid.levels]
+        lengths = [sum(level.shape[0] * level.shape[1] for level in p.levels) for p in pyramids]
+        starts = np.concatenate([[0], np.cumsum(lengths)]).astype(np.int64).tolist()[:-1]
+        joined = np.concatenate(rows) if rows else np.zeros((1, channels), np.float32)
+        for pyramid, start in zip(pyramids, starts, strict=True):
+            pyramid.levels = _views(joined, start, pyramid.levels)
+        self._stored[which] = pyramids, joined, starts
+        return joined, starts
+
+
+def _views(joined: F32, start: int, levels: tuple[F32, ...]) -> tuple[F32, ...]:
+    made = []
+    for level in levels:
+        stop = start + level.shape[0] * level.shape[1]
+        made.append(joined[start:stop].reshape(level.shape))
+        start = stop
+    return tuple(made)
+
+
+def _same(a: Maps, b: Maps) -> bool:
+    if a.texels is not b.texels or a.tables is not b.tables:
+        return False
+    pairs = ((a.kind, b.kind), (a.first, b.first), (a.size, b.size), (a.uv_scale, b.uv_scale))
+    return all(np.array_equal(x, y) for x, y in pairs)
+
+
+def _picture_key(resolved: Resolved) -> tuple[str, bool]:
+    """What picture a material with one texture shows: its content, and whether one channel stands for all."""
+    ((name, texture),) = resolved.textures.items()
+    return texture.image.key, np.ndim(np.asarray(resolved.values[name])) == 0
+
+
+def _picture(image: Image, grey: bool) -> _Pyramid:
+    texels = linear_rgb(image)[::-1]
+    return _pyramid(np.repeat(texels[..., :1], 3, axis=2) if grey else texels)
+
+
+def _pyramid(base: F32) -> _Pyramid:
+    """Halved down to one texel, at most LEVELS times."""
+    level = np.ascontiguousarray(base)
+    levels = [level]
+    while max(level.shape[:2]) > 1 and len(levels) < LEVELS:
+        height, width = max(level.shape[0] // 2, 1), max(level.shape[1] // 2, 1)
+        y, x = level.shape[0] // height, level.shape[1] // width
+        cut = level[: height * y, : width * x].reshape(height, y, width, x, level.shape[2])
+        level = cut.mean(axis=(1, 3), dtype=np.float32)
+        levels.append(level)
+    return _Pyramid(tuple(levels), base.min(axis=(0, 1)), base.max(axis=(0, 1)))
+
+
+def _map_size(resolved: Resolved) -> tuple[int, int]:
+    sizes = [texture.image.pixels.shape[:2] for texture in resolved.textures.values()]
+    return max(h for h, _ in sizes), max(w for _, w in sizes)
+
+
+def _uv_scale(resolved: Resolved) -> F32:
+    for texture in resolved.textures.values():
+        return np.array([*texture.scale, *texture.offset], np.float32)
+    return np.array([1, 1, 0, 0], np.float32)
+
+
+def _line(resolved: Resolved, picture: _Pyramid) -> tuple[F32, F32] | None:
+    """Coefficients (TERMS·3,) at texel 0 and their slopes, channel by channel; None where they bend."""
+    low, high = picture.low.astype(np.float64), picture.high.astype(np.float64)
+    ramp = np.linspace(0, 1, PROBES)[:, None]
+    mixed = np.random.default_rng(0).random((PROBES, 3))
+    at = (low + np.concatenate([ramp * np.ones(3), mixed]) * (high - low)).astype(np.float32)
+    made = _at_texels(resolved, at).astype(np.float64)
+    ((name, _),) = resolved.textures.items()
+    if np.ndim(np.asarray(resolved.values[name])) == 0:
+        made, at = made[:PROBES], at[:PROBES]  # one channel stands for all
+    rise = np.where(high > low, high - low, 1)
+    slope = np.where(high > low, (made[PROBES - 1] - made[0]) / rise, 0)  # (TERMS, 3)
+    plain = made[0] - slope * low
+    error = np.abs(plain + slope * at[:, None, :] - made).max(initial=0)
+    if not error <= AFFINE_WITHIN * np.abs(made).max(initial=0):
+        return None
+    return plain.reshape(WIDTH).astype(np.float32), slope.reshape(WIDTH).astype(np.float32)
+
+
+def _at_texels(resolved: Resolved, texels: F32) -> F32:
+    """(K, TERMS, 3) coefficients where the one texture has texels (K, 3)."""
+    values: dict[str, Any] = {}
+    for name, value in resolved.values.items():
+        if _numeric(value):
+            number = np.asarray(value, np.float32)
+            if name in resolved.textures:
+                number = number * (texels[:, 0] if number.ndim == 0 else texels)
+            values[name] = np.broadcast_to(number, (len(texels), *np.shape(value)))
+    made = np.asarray(resolved.brdf.coefficients(values), np.float32)
+    padded = np.zeros((len(texels), TERMS, 3), np.float32)
+    padded[:, : made.shape[-2]] = made
+    return padded
+
+
+def _numeric(value: Value) -> bool:
+    return not isinstance(value, str | bool)

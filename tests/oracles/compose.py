@@ -1,0 +1,109 @@
+"""A picture sample by sample: light sums interpolated, coefficients read from their own maps, float64."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+from oracles.radiance import bilinear_repeat, lat_long
+
+from studio_core.scene.nodes import Light
+from studio_core.shading.artifacts import TERMS
+from studio_core.shading.lamps import shown_environment
+from studio_core.shading.materials import coefficients, linear_rgb, resolve
+
+Array = npt.NDArray[np.float64]
+NO_BACK = 0xFFFFFFFF
+
+
+def halved(level: Array) -> Array:
+    """Boxes of two by two, or what is left of them at the edges."""
+    height, width = max(level.shape[0] // 2, 1), max(level.shape[1] // 2, 1)
+    y, x = level.shape[0] // height, level.shape[1] // width
+    cut = level[: height * y, : width * x].reshape(height, y, width, x, *level.shape[2:])
+    return np.asarray(cut.mean(axis=(1, 3)))
+
+
+class Painter:
+    """Colours of single samples."""
+
+    def __init__(self, scene, radiance, hits, registry):
+        lights = {light.id: light for light in scene.of(Light) if scene.shown(light.id)}
+        self.mesh, self.view, self.surfaces = radiance.surfaces.mesh, hits.view, radiance.surfaces
+        self.terms = radiance.combined(lights).astype(np.float64)
+        self.maps, self.uv = [], []
+        for name in radiance.surfaces.materials:
+            resolved = resolve(scene.material(name), registry)
+            base = coefficients(resolved).astype(np.float64).reshape(-1, 1, TERMS, 3)
+            if resolved.textures:
+                base = coefficients(resolved).astype(np.float64)
+            levels = [base]
+            while max(levels[-1].shape[:2]) > 1 and len(levels) < 12:
+                levels.append(halved(levels[-1]))
+            self.maps.append(levels)
+            texture = next(iter(resolved.textures.values()), None)
+            self.uv.append((texture.scale, texture.offset) if texture else ((1, 1), (0, 0)))
+        sky = shown_environment(scene)
+        self.sky = sky if sky is not None and sky.background else None
+        self.sky_pixels = linear_rgb(self.sky.image).astype(np.float64) if self.sky else None
+
+    def direction(self, sample):
+        view, n = self.view, self.view.antialias
+        pixel, inner = divmod(sample, n * n)
+        x, y = (pixel % view.width) * n + inner % n, (pixel // view.width) * n + inner // n
+        up = np.tan(np.radians(view.fov) / 2)
+        a = ((x + 0.5) / (view.width * n) * 2 - 1) * up * view.width / view.height
+        b = (1 - (y + 0.5) / (view.height * n) * 2) * up
+        along = view.transform.matrix()[:3, :3] @ (a, b, -1)
+        return along / np.linalg.norm(along)
+
+    def sample(self, hits, index, sample):
+        """Radiance of one sample, and the footprint in texels where a map was read."""
+        along, face = self.direction(sample), hits.face[index]
+        if face < 0:
+            if self.sky is None:
+                return np.zeros(3), None
+            back = self.sky.rotation().matrix()[:3, :3].T
+            return lat_long(self.sky_pixels, back @ along) * self.sky.gain(), None
+        mesh = self.mesh
+        corners = mesh.faces[face]
+        a, b, c = mesh.positions[corners].astype(np.float64)
+        normal = np.cross(b - a, c - a)
+        size = np.linalg.norm(normal)
+        away = normal @ along / size if size > 0 else 0.0
+        weights = np.array([1 - float(hits.u[index]) - hits.v[index], hits.u[index], hits.v[index]])
+        m = mesh.material[corners[0]]
+        levels, (scale, offset) = self.maps[m], self.uv[m]
+        footprint = None
+        if len(levels) == 1:
+            look = levels[0][0, 0]
+        else:
+            uv = (weights @ mesh.uvs[corners].astype(np.float64)) * scale + offset
+            e, f = mesh.uvs[corners[1:]].astype(np.float64) - mesh.uvs[corners[0]]
+            texels = abs(e[0] * f[1] - e[1] * f[0]) * scale[0] * scale[1] * np.prod(levels[0].shape[:2])
+            angle = 2 * np.tan(np.radians(self.view.fov) / 2) / (self.view.height * self.view.antialias)
+            footprint = hits.distance[index] * angle * np.sqrt(texels / size) / np.sqrt(max(abs(away), 0.05))
+            level = int(np.clip(np.floor(np.log2(footprint) + 0.5), 0, len(levels) - 1))
+            look = bilinear_repeat(levels[level], *(uv - np.floor(uv)))
+        if away > 0 and mesh.back_faces[face, 0] != NO_BACK:
+            corners = mesh.back_faces[face]
+        colour = (look * np.einsum("k,ktc->tc", weights, self.terms[corners])).sum(axis=0)
+        for inside, rest in hits.behind:
+            for at in np.flatnonzero(inside == index):
+                alpha = float(self.surfaces.opacity[mesh.face_material[face]])
+                under, _ = self.sample(rest, at, sample)
+                colour = alpha * colour + (1 - alpha) * under
+        return colour, footprint
+
+
+def picture(scene, radiance, hits, registry) -> tuple[Array, npt.NDArray[np.bool_]]:
+    """(H, W, 3), and the pixels (H, W) where rounding may decide between two levels of a map."""
+    painter, n2 = Painter(scene, radiance, hits, registry), hits.samples**2
+    view = hits.view
+    out, unsure = np.zeros((view.height * view.width, 3)), np.zeros(view.height * view.width, np.bool_)
+    for sample in range(len(hits.face)):
+        colour, footprint = painter.sample(hits, sample, sample)
+        out[sample // n2] += colour / n2
+        if footprint is not None:
+            step = np.log2(max(footprint, 1e-9)) + 0.5
+            unsure[sample // n2] |= abs(step - np.round(step)) < 1e-4
+    return out.reshape(view.height, view.width, 3), unsure.reshape(view.height, view.width)
