@@ -9,8 +9,10 @@ from typing import Any
 from studio_core.contract import Services
 from studio_core.params import param
 from studio_core.shading.stages import Adaptive, SurfaceParams, common_stages
+from studio_plugins.cuts.focus_stage import FocusStage
 from studio_plugins.cuts.quality import quality
-from studio_plugins.cuts.stages import LightStage, RadianceStage, VisibilityStage
+from studio_plugins.cuts.radiance_stage import RadianceStage
+from studio_plugins.cuts.stages import LightStage, VisibilityStage
 
 
 @dataclass(frozen=True)
@@ -55,6 +57,7 @@ class Cuts:
             *common_stages(services, _adaptive),
             VisibilityStage(services),
             LightStage(services),
+            FocusStage(services),
             RadianceStage(services),
         ]
 

@@ -25,6 +25,7 @@ SUMS = 16
 """Columns: power and vector (p, x, y, z) of luminance, red, green and blue: one line of the cache."""
 DEEPEST = 20
 MOST_NODES = 2048
+NODE = 8
 BLOCK = 64
 
 
@@ -101,6 +102,35 @@ def sums_until(
 
 
 @kernel
+def write_node(
+    sums: F32,
+    power: np.float32,
+    moment: np.float32,
+    nx: np.float32,
+    ny: np.float32,
+    nz: np.float32,
+    axes: F64,
+    sign: np.float32,
+    cell: int,
+    out: F32,
+) -> None:
+    """out (NODE,) becomes direction (3, in the shading frame), irradiance (3), spread and cell of a node.
+
+    sums (16,) of its light, of which `power` and `moment` are luminance and the length of its vector.
+    """
+    scale = np.float32(1) / moment
+    x, y, z = sums[1] * scale, sums[2] * scale, sums[3] * scale
+    out[0] = axes[0, 0] * x + axes[0, 1] * y + axes[0, 2] * z
+    out[1] = axes[1, 0] * x + axes[1, 1] * y + axes[1, 2] * z
+    out[2] = axes[2, 0] * x + axes[2, 1] * y + axes[2, 2] * z
+    out[3] = sign * max(nx * sums[5] + ny * sums[6] + nz * sums[7], np.float32(0))
+    out[4] = sign * max(nx * sums[9] + ny * sums[10] + nz * sums[11], np.float32(0))
+    out[5] = sign * max(nx * sums[13] + ny * sums[14] + nz * sums[15], np.float32(0))
+    out[6] = max(np.float32(2) * (power - moment) / power, np.float32(0))
+    out[7] = cell
+
+
+@kernel
 def choose_nodes(
     runs: Pool,
     count: int,
@@ -116,7 +146,7 @@ def choose_nodes(
     made: F32,
     found: int,
 ) -> int:
-    """Writes nodes as rows of made (MOST_NODES, 6) from `found` on; where they end.
+    """Writes nodes as rows of made (MOST_NODES, NODE) from `found` on; where they end.
 
     n is the vertex' normal, axes its shading frame; colours are multiplied by `sign`.
     """
@@ -148,14 +178,9 @@ def choose_nodes(
                 continue
             for i in range(SUMS):
                 here[i] = stack[depth, i] - low[i]
-            scale = np.float32(1) / moment
-            dx, dy, dz = mx * scale, my * scale, mz * scale
-            made[found, 0] = axes[0, 0] * dx + axes[0, 1] * dy + axes[0, 2] * dz
-            made[found, 1] = axes[1, 0] * dx + axes[1, 1] * dy + axes[1, 2] * dz
-            made[found, 2] = axes[2, 0] * dx + axes[2, 1] * dy + axes[2, 2] * dz
-            made[found, 3] = sign * max(nx * here[5] + ny * here[6] + nz * here[7], np.float32(0))
-            made[found, 4] = sign * max(nx * here[9] + ny * here[10] + nz * here[11], np.float32(0))
-            made[found, 5] = sign * max(nx * here[13] + ny * here[14] + nz * here[15], np.float32(0))
+            write_node(
+                here, power, moment, nx, ny, nz, axes, sign, (len(leaf) - 1 + place) // size, made[found]
+            )
             found += 1
         place += size
         for i in range(SUMS):

@@ -13,7 +13,7 @@ import numpy.typing as npt
 from studio_core.colour import LUMINANCE
 from studio_core.jit import kernel
 from studio_core.kernels.radiance import frame
-from studio_plugins.cuts.choose import MOST_NODES, SUMS, accumulate, choose_nodes
+from studio_plugins.cuts.choose import MOST_NODES, NODE, SUMS, accumulate, choose_nodes
 from studio_plugins.cuts.intervals import ONES, U64, Pool, clear, hide, runs_of, set_bits
 
 F32 = npt.NDArray[np.float32]
@@ -49,23 +49,27 @@ def gather_light(
     irradiance: F32,
     out: F32,
     nodes: I64,
+    detail: F32,
+    out_runs: Pool,
+    run_count: I64,
 ) -> int:
     """Irradiance (V, 3) of points[begin:stop], and in `out` their nodes, one point after the other.
 
     A surface that is not glossy gets one node, whose direction nobody looks at. `nodes` (P,) counts them.
     The tolerance is a share of the point's luminous irradiance, and at least of `floor`. Records as in
-    `Sources`. Returns how many points fitted into `out`.
+    `Sources`. `detail` gets spread and cell of every node, `out_runs` the runs of points with nodes, of which
+    `run_count` (P,) says how many. Returns how many points fitted.
     """
     leaves = len(leaf) - 1
     words = np.empty(leaves >> 6, np.uint64)
     runs = np.empty(leaves + 2, pool.dtype)
     before = np.empty((leaves // 2 + 2, SUMS), np.float32)
     axes = np.empty((3, 3))
-    made = np.empty((MOST_NODES, 6), np.float32)
+    made = np.empty((MOST_NODES, NODE), np.float32)
     everything = np.zeros(skip.shape[2], np.bool_)
-    place = 0
+    place = kept = 0
     for number in range(begin, stop):
-        if len(out) - place < 6 * MOST_NODES:
+        if len(out) - 6 * place < 6 * MOST_NODES or len(out_runs) - kept < leaves + 2:
             return number - begin
         p = points[number]
         nx, ny, nz = normals[p, 0], normals[p, 1], normals[p, 2]
@@ -106,8 +110,15 @@ def gather_light(
         nodes[number] = found
         for line in range(6):
             for node in range(found):
-                out[place + node] = made[node, line]
-            place += found
+                out[6 * place + line * found + node] = made[node, line]
+        run_count[number] = count if glossy[p] and found else 0
+        if glossy[p]:
+            for node in range(found):
+                detail[2 * (place + node)] = made[node, 6]
+                detail[2 * (place + node) + 1] = made[node, 7]
+            out_runs[kept : kept + 2 * run_count[number]] = runs[: 2 * run_count[number]]
+            kept += 2 * run_count[number]
+        place += found
     return stop - begin
 
 
@@ -187,7 +198,7 @@ def gather_difference(
     runs = np.empty(leaves + 2, pool.dtype)
     before = np.empty((leaves // 2 + 2, SUMS), np.float32)
     axes = np.empty((3, 3))
-    made = np.empty((MOST_NODES, 6), np.float32)
+    made = np.empty((MOST_NODES, NODE), np.float32)
     everything = np.ones(skip.shape[2], np.bool_)
     reach = np.empty(2, np.int64)
     place = 0

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any
-
 import numpy as np
 import numpy.typing as npt
 
@@ -14,7 +11,7 @@ from studio_core.scene.world_mesh import WorldMesh
 from studio_core.shading.job import Job
 from studio_plugins.cuts.choose import MOST_NODES, Prefix
 from studio_plugins.cuts.gather import gather_difference, gather_light
-from studio_plugins.cuts.nodes import FLOATS, NodeBlock, NodeTable
+from studio_plugins.cuts.nodes import FLOATS, Detail, NodeBlock, NodeTable
 from studio_plugins.cuts.store import Sources, VisibilityStore
 
 I64 = npt.NDArray[np.int64]
@@ -22,7 +19,7 @@ Bools = npt.NDArray[np.bool_]
 
 CHUNK = 128
 _FLOOR = 0.02  # of the irradiance of an open place: darker ones need no finer nodes
-_ROOM = 384  # nodes a point that room is made for at first
+_ROOM, _RUNS = 384, 1024  # nodes and run ends a point that room is made for at first
 
 
 class LightCache:
@@ -41,6 +38,11 @@ class LightCache:
         self._prefix: Prefix | None = None
         self._stamp = np.zeros(0, np.int64)
         self._glossy = np.zeros(0, np.bool_)
+
+    @property
+    def prefix(self) -> Prefix | None:
+        """Sums of the light that is gathered."""
+        return self._prefix
 
     def follow(self, store: VisibilityStore, tree: LightTree | None, tolerance: float) -> None:
         """Turn to the vertices of a store and this light; what was summed under another is forgotten."""
@@ -81,67 +83,89 @@ class LightCache:
         partly &= (sources.exact_stamp[changed] > 0) & ~_mostly(sources, mesh, changed)
         whole, rest = changed[~partly], changed[partly]
         if len(whole):
-            self._sum(gather_light, self.table, sources, mesh, whole, glossy, (), job)
+            self._sum(sources, mesh, whole, glossy, True, job)
             self._stamp[whole] = sources.stamp[whole]
             self._glossy[whole] = glossy[whole]
         if len(rest) or self.difference.blocks:
             self.difference = self.difference.resized(len(self.table))
         if len(rest):
-            known = (self.table.irradiance,)
-            self._sum(gather_difference, self.difference, sources, mesh, rest, glossy, known, job)
+            self._sum(sources, mesh, rest, glossy, False, job)
         return len(changed)
 
     def _sum(
         self,
-        kernel: Callable[..., int],
-        table: NodeTable,
         sources: Sources,
         mesh: WorldMesh,
         points: I64,
         glossy: Bools,
-        known: tuple[npt.NDArray[Any], ...],
+        whole: bool,
         job: Job,
     ) -> None:
         prefix = self._prefix
         assert prefix is not None
-        floor = _FLOOR * prefix.power / 4
-        counts = np.zeros(len(points), np.int64)
+        table = self.table if whole else self.difference
+        counts, run_counts = np.zeros(len(points), np.int64), np.zeros(len(points), np.int64)
         found: dict[int, NodeBlock] = {}
+        given = (
+            mesh.normals,
+            mesh.object,
+            glossy,
+            sources.pool,
+            sources.start,
+            sources.length,
+            sources.coarse_pool,
+            sources.coarse_start,
+            sources.coarse_length,
+            sources.row,
+            sources.skip,
+            prefix.block,
+            prefix.leaf,
+            self._tolerance,
+            _FLOOR * prefix.power / 4,
+        )
 
         def body(begin: int, stop: int) -> None:
             while begin < stop:
-                out = np.empty(FLOATS * (MOST_NODES + _ROOM * (stop - begin)), np.float32)
-                done = kernel(
-                    begin,
-                    stop,
-                    points,
-                    mesh.normals,
-                    mesh.object,
-                    glossy,
-                    sources.pool,
-                    sources.start,
-                    sources.length,
-                    sources.coarse_pool,
-                    sources.coarse_start,
-                    sources.coarse_length,
-                    sources.row,
-                    sources.skip,
-                    prefix.block,
-                    prefix.leaf,
-                    self._tolerance,
-                    floor,
-                    *known,
-                    table.irradiance,
-                    out,
-                    counts,
-                )
-                first = np.concatenate([[0], np.cumsum(counts[begin : begin + done])]).astype(np.int64)
+                room = MOST_NODES + _ROOM * (stop - begin)
+                out = np.empty(FLOATS * room, np.float32)
+                if whole:
+                    detail = np.empty(2 * room, np.float32)
+                    runs = np.empty((2 << store_k) + _RUNS * (stop - begin), sources.pool.dtype)
+                    done = gather_light(
+                        begin,
+                        stop,
+                        points,
+                        *given,
+                        table.irradiance,
+                        out,
+                        counts,
+                        detail,
+                        runs,
+                        run_counts,
+                    )
+                else:
+                    done = gather_difference(
+                        begin, stop, points, *given, self.table.irradiance, table.irradiance, out, counts
+                    )
+                first = starts(counts[begin : begin + done])
                 data = out[: FLOATS * int(first[-1])].copy()
-                found[begin] = NodeBlock(points[begin : begin + done], first, data)
+                more = None
+                if whole:
+                    own = detail[: 2 * int(first[-1])].reshape(-1, 2)
+                    run_first = starts(run_counts[begin : begin + done])
+                    kept = runs[: 2 * int(run_first[-1])].copy()
+                    more = Detail(own[:, 0].copy(), own[:, 1].astype(np.int32), run_first, kept)
+                found[begin] = NodeBlock(points[begin : begin + done], first, data, more)
                 begin += done
 
+        store_k = len(prefix.leaf).bit_length() - 1
         self._workers.run(len(points), CHUNK, body, job)
         table.replace([found[begin] for begin in sorted(found)])
+
+
+def starts(counts: I64) -> I64:
+    """Where each of so many begins, and where the last ends."""
+    return np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
 
 
 def _mostly(sources: Sources, mesh: WorldMesh, points: I64) -> Bools:

@@ -18,7 +18,7 @@ F32 = npt.NDArray[np.float32]
 
 FLAT = 1e-5  # relative variation up to which a kernel counts as constant
 _VIEWS = np.radians([0.0, 35.0, 65.0])
-_ARC = np.concatenate([[0.0], np.geomspace(1e-4, np.pi / 2, 160)])
+_ARC = np.concatenate([[0.0], np.geomspace(1e-4, 0.999 * np.pi / 2, 160)])
 
 
 @kernel
@@ -28,11 +28,11 @@ def _evaluate(address: int, shape: F32, wo: F32, count: int, wi: F32, out: F32) 
 
 @dataclass(frozen=True)
 class Lobe:
-    """`flat`: every kernel is the same for all directions of light. `width`: radians from the mirror
-    direction towards the normal to where the kernels together have fallen by half; inf without a peak."""
+    """`flat`: every kernel is the same for all directions of light. `slope`: the α of the microfacets whose
+    lobe is as wide as the kernels together, seen from above; 0: they have no peak."""
 
     flat: bool
-    width: float
+    slope: float
 
 
 class LobeTable:
@@ -60,21 +60,18 @@ def probe(address: int, terms: int, shape: F32) -> Lobe:
     """The lobe of one kernel; see `Lobe`."""
     if len(shape) == 0:
         shape = np.zeros(1, np.float32)
-    flat, width = True, float("inf")
-    every = _hemisphere()
+    flat = True
     for view in _VIEWS:
-        values = _values(address, terms, shape, view, every)
+        values = _values(address, terms, shape, view, _hemisphere())
         spread = values.max(axis=1) - values.min(axis=1)
         flat &= bool((spread <= FLAT * np.abs(values).max(axis=1)).all())
-        # From the mirror direction towards the normal and beyond, in the plane of incidence.
-        angles = view - _ARC
-        along = np.stack([-np.sin(angles), np.zeros_like(angles), np.cos(angles)], axis=1)
-        seen = along[:, 2] > 1e-3
-        arc = _values(address, terms, shape, view, along[seen]).sum(axis=0)
-        if arc[0] > 0 and arc.min() < (1 - FLAT) * arc[0]:
-            half = 0.5 * (arc[0] + arc.min())
-            width = min(width, float(_ARC[seen][np.flatnonzero(arc < half)[0]]))
-    return Lobe(flat, width)
+    along = np.stack([np.sin(_ARC), np.zeros_like(_ARC), np.cos(_ARC)], axis=1)
+    arc = _values(address, terms, shape, 0.0, along).sum(axis=0)
+    if flat or not arc[0] > 0 or arc.min() >= (1 - FLAT) * arc[0]:
+        return Lobe(flat, 0.0)
+    below = np.flatnonzero(arc < 0.5 * (arc[0] + arc.min()))[0]
+    # D of GGX (Walter et al. 2007, eq. 33) has fallen by half where tan θ_h = α √(√2 − 1).
+    return Lobe(False, float(np.tan(_ARC[below] / 2) / np.sqrt(np.sqrt(2) - 1)))
 
 
 def _hemisphere() -> npt.NDArray[np.float64]:

@@ -7,8 +7,10 @@ and traced lamps all make them; only the sum over BRDFs follows.
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -29,6 +31,25 @@ _BLOCKS_A_CHUNK = 2
 
 
 @dataclass(frozen=True)
+class Detail:
+    """What splitting the nodes of a block further needs.
+
+    spread (N,) mean square angle of each node's light about its direction; cell (N,) the node of the tree of
+    directions it stands for; run_first (P + 1,) and runs: first and last leaf of all that each point sees.
+    """
+
+    spread: F32
+    cell: I32
+    run_first: I64
+    runs: npt.NDArray[Any]
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of all arrays."""
+        return self.spread.nbytes + self.cell.nbytes + self.run_first.nbytes + self.runs.nbytes
+
+
+@dataclass(frozen=True)
 class NodeBlock:
     """The nodes of some points, as BRDF kernels read them.
 
@@ -40,11 +61,13 @@ class NodeBlock:
     points: I64
     first: I64
     data: F32
+    detail: Detail | None = None
 
     @property
     def nbytes(self) -> int:
         """Bytes of all arrays."""
-        return self.points.nbytes + self.first.nbytes + self.data.nbytes
+        own = self.points.nbytes + self.first.nbytes + self.data.nbytes
+        return own + (self.detail.nbytes if self.detail is not None else 0)
 
     @property
     def most(self) -> int:
@@ -87,7 +110,7 @@ class NodeTable:
         for name in ("irradiance", "version", "_owner"):
             getattr(made, name)[to[kept]] = getattr(self, name)[kept]
         made.blocks = {
-            number: NodeBlock(to[block.points], block.first, block.data)
+            number: dataclasses.replace(block, points=to[block.points])
             for number, block in self.blocks.items()
         }
         return made
@@ -106,6 +129,28 @@ class NodeTable:
             mine = (block.points >= 0) & (self._owner[block.points] == number)
             total += int(np.diff(block.first)[mine].sum())
         return total
+
+    @property
+    def owned(self) -> Bools:
+        """(V,) which vertices have a block, be it of no nodes."""
+        return np.asarray(self._owner != NO_BLOCK)
+
+    def numbered(self) -> list[tuple[int, NodeBlock]]:
+        """All blocks with their numbers, in order."""
+        return sorted(self.blocks.items())
+
+    @property
+    def owner(self) -> I32:
+        """(V,) number of the block that has each vertex' nodes, or NO_BLOCK; do not change."""
+        return self._owner
+
+    def drop(self, points: Bools) -> None:
+        """These vertices have no nodes any more."""
+        points = points & (self._owner != NO_BLOCK)
+        if points.any():
+            self._newest += 1
+            self.version[points] = self._newest
+            self._owner[points] = NO_BLOCK
 
     def replace(self, blocks: Sequence[NodeBlock]) -> None:
         """Blocks that from now on have the nodes of their points; irradiance is the caller's."""
@@ -132,15 +177,14 @@ class NodeTable:
 
         The eye is relative to the mesh's origin.
         """
-        numbers = sorted(self.blocks)
-        blocks = [self.blocks[number] for number in numbers]
-        looked = np.zeros(len(blocks), np.int64)
+        numbered = self.numbered()
+        looked = np.zeros(len(numbered), np.int64)
 
         def body(begin: int, stop: int) -> None:
             for index in range(begin, stop):
-                block = blocks[index]
+                number, block = numbered[index]
                 looked[index] = node_terms(
-                    numbers[index],
+                    number,
                     block.points,
                     block.first,
                     block.data,
@@ -158,5 +202,5 @@ class NodeTable:
                     out,
                 )
 
-        workers.run(len(blocks), _BLOCKS_A_CHUNK, body, job)
+        workers.run(len(numbered), _BLOCKS_A_CHUNK, body, job)
         return int(looked.sum())

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -20,12 +20,9 @@ from studio_core.scene.diff import Aspect
 from studio_core.scene.nodes import NodeId
 from studio_core.scene.transform import Transform
 from studio_core.shading.artifacts import (
-    TERMS,
     Casters,
     Hits,
-    LayerRadiance,
     Lighting,
-    Radiance,
     Shapes,
     Surfaces,
 )
@@ -33,6 +30,7 @@ from studio_core.shading.frame import Frame
 from studio_core.shading.job import Job
 from studio_core.shading.pipeline import Inputs
 from studio_core.shading.primary import visible_vertices
+from studio_plugins.cuts.choose import Prefix
 from studio_plugins.cuts.lamps import LampCache, Source, lamp_source, sphere
 from studio_plugins.cuts.light_cache import LightCache
 from studio_plugins.cuts.lobes import LobeTable
@@ -124,10 +122,15 @@ class VisibilityStage:
 
 @dataclass(frozen=True, eq=False)
 class Arriving:
-    """The light of every layer at the vertices: tables of nodes, which change in place."""
+    """The light of every layer at the vertices: tables of nodes, which change in place.
+
+    `environment` is the table of what exact records see, made from `prefix` sums.
+    """
 
     layers: tuple[tuple[NodeId, tuple[NodeTable, ...]], ...]
     newest: tuple[int, ...]
+    environment: NodeTable | None
+    prefix: Prefix | None
     summed: int
     lamp_points: int
 
@@ -184,7 +187,9 @@ class LightStage:
         previous: Arriving | None = inputs.previous
         if previous is not None and previous.newest == newest and _same(previous.layers, layers):
             return previous
-        return Arriving(layers, newest, summed, looked)
+        there = lighting.environment is not None
+        environment = self._environment.table if there else None
+        return Arriving(layers, newest, environment, self._environment.prefix, summed, looked)
 
     def _tables(self, lighting: Lighting) -> list[tuple[NodeId, tuple[NodeTable, ...]]]:
         made: list[tuple[NodeId, tuple[NodeTable, ...]]] = []
@@ -244,100 +249,3 @@ def _same(a: Sequence[tuple[NodeId, Any]], b: Sequence[tuple[NodeId, Any]]) -> b
     return [node for node, _ in a] == [node for node, _ in b] and all(
         one is other for (_, s), (_, t) in zip(a, b, strict=True) for one, other in zip(s, t, strict=True)
     )
-
-
-@dataclass
-class _Layer:
-    """What was last handed on for a layer, and from which nodes."""
-
-    radiance: LayerRadiance
-    version: list[I64] = field(default_factory=list)
-
-
-class RadianceStage:
-    """Sums BRDFs over nodes, for the vertices where nodes, material or eye are others than before."""
-
-    needs: tuple[type, ...] = (Surfaces, Shapes, Lighting, Hits, Seen, Arriving)
-    gives = Radiance
-    dirtied_by = Aspect.VIEW | Aspect.QUALITY
-
-    def __init__(self, services: Services) -> None:
-        self._workers = services.workers
-        self._layers: dict[NodeId, _Layer] = {}
-        self._eye: tuple[float, ...] = ()
-        self._shapes: list[tuple[int, bytes]] = []
-        self._material: npt.NDArray[np.int32] = np.zeros(0, np.int32)
-
-    def run(self, frame: Frame, inputs: Inputs, job: Job) -> Radiance:
-        """Radiance of all layers; vertices that are not seen have none."""
-        surfaces, shapes, seen = inputs[Surfaces], inputs[Shapes], inputs[Seen]
-        mesh, arriving = surfaces.mesh, inputs[Arriving]
-        count = len(mesh.positions)
-        eye = tuple(frame.view.transform.translation)
-        local_eye = (np.asarray(eye, np.float64) - mesh.origin).astype(np.float32)
-        moved = eye != self._eye or len(self._material) != count
-        table = _shape_table(shapes)
-        changed = _changed_materials(self._shapes, table)
-        other = np.append(changed, True)[mesh.material]
-        if len(self._material) == count:
-            other |= self._material != mesh.material
-        layers: dict[NodeId, LayerRadiance] = {}
-        kept: dict[NodeId, _Layer] = {}
-        looked = shaded = 0
-        for node, tables in arriving.layers:
-            before = self._layers.get(node)
-            versions = [table_.version.copy() for table_ in tables]
-            if before is None or moved or len(before.version) != len(versions):
-                dirty = seen.mask
-                terms = np.zeros((count, TERMS, 3), np.float32)
-                irradiance = np.zeros((count, 3), np.float32)
-            else:
-                fresh = ~other
-                for was, is_ in zip(before.version, versions, strict=True):
-                    fresh &= was == is_
-                dirty = seen.mask & ~fresh
-                if not dirty.any():
-                    layers[node], kept[node] = before.radiance, before
-                    continue
-                terms, irradiance = before.radiance.terms.copy(), before.radiance.irradiance.copy()
-                terms[dirty] = 0
-            rows = np.flatnonzero(dirty)
-            irradiance[rows] = sum((t.irradiance[rows] for t in tables), np.zeros((len(rows), 3), np.float32))
-            for nodes in tables:
-                looked += nodes.shade(mesh, shapes, local_eye, dirty, terms, self._workers, job)
-            shaded += len(rows)
-            done = [
-                np.where(dirty, v, w)
-                for v, w in zip(versions, _or_blank(before, versions, moved), strict=True)
-            ]
-            layers[node] = LayerRadiance(terms, irradiance)
-            kept[node] = _Layer(layers[node], done)
-        self._layers, self._eye, self._shapes, self._material = kept, eye, table, mesh.material
-        counts = {
-            **seen.store.summary(),
-            "vertices": count,
-            "skipped_vertices_unseen": count - len(seen.points),
-            "vertices_shaded": shaded,
-            "vertices_summed": arriving.summed,
-            "vertices_traced_to_lamps": arriving.lamp_points,
-            "nodes": looked,
-        }
-        return Radiance(surfaces, inputs[Hits], layers, seen.mask, 1 << seen.level, seen.exact, counts)
-
-
-def _or_blank(before: _Layer | None, versions: list[I64], moved: bool) -> list[I64]:
-    if before is None or moved or len(before.version) != len(versions):
-        return [np.full_like(version, -1) for version in versions]
-    return before.version
-
-
-def _shape_table(shapes: Shapes) -> list[tuple[int, bytes]]:
-    bounds = np.append(shapes.offset, len(shapes.data))
-    return [
-        (int(shapes.address[m]), shapes.data[bounds[m] : bounds[m + 1]].tobytes())
-        for m in range(len(shapes.address))
-    ]
-
-
-def _changed_materials(before: list[tuple[int, bytes]], now: list[tuple[int, bytes]]) -> Bools:
-    return np.array([m >= len(before) or before[m] != shape for m, shape in enumerate(now)], np.bool_)

@@ -1,0 +1,261 @@
+"""Nodes split further where a sharp BRDF, seen from where the eye is, needs it.
+
+Nodes are chosen without regard to BRDF and view. A lobe that is narrower than a node is lost in it; so for
+every node its error is estimated: what it contributes (the kernels themselves are asked) times how far its
+light spreads within the lobe, squared, both about half vectors, as for microfacets. Nodes whose estimate is
+above a share of the whole are split into up to eight, and those again, at most down to leaves.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from studio_core.jit import call_address, kernel
+from studio_core.kernels.radiance import frame, local_view
+from studio_plugins.cuts.choose import BLOCK, MOST_NODES, NODE, SUMS, write_node
+from studio_plugins.cuts.intervals import Pool
+
+F32 = npt.NDArray[np.float32]
+F64 = npt.NDArray[np.float64]
+I32 = npt.NDArray[np.int32]
+I64 = npt.NDArray[np.int64]
+Bools = npt.NDArray[np.bool_]
+
+ROUNDS = 6
+LEVELS = 3  # a split node becomes at most 2^LEVELS
+_LEAST_COSINE = np.float32(0.05)
+_BOOST = np.float32(1e4)
+
+
+@kernel
+def _luminous(values: F32, count: int, terms: int, weights: F32, node: int) -> np.float32:
+    total = np.float32(0)
+    for k in range(terms):
+        total += weights[k] * values[k * count + node]
+    return total
+
+
+@kernel
+def lobe_error(
+    x: np.float32,
+    y: np.float32,
+    z: np.float32,
+    wo: F32,
+    spread: np.float32,
+    contribution: np.float32,
+    light: np.float32,
+    alpha: np.float32,
+) -> np.float32:
+    """Estimated error of a node in direction (x, y, z) with mean square angle `spread`, in radiance.
+
+    contribution is irradiance times BRDF at the direction, light the irradiance; alpha the lobe's width as
+    the slope of half vectors. A lobe that stands inside the node shows by the rise of
+    (1 + tan² / α²)^-2 from the node's direction to where the node comes nearest to the lobe.
+    """
+    hx, hy, hz = x + wo[0], y + wo[1], z + wo[2]
+    length = np.float32(np.sqrt(hx * hx + hy * hy + hz * hz))
+    along = max(np.float32(0.5) * length, _LEAST_COSINE)  # cosine between light and half vector
+    up = max(hz / length, np.float32(1e-3))
+    slope2 = (np.float32(1) - up * up) / (up * up)
+    width2 = spread / (np.float32(4) * along * along)
+    slope = np.float32(np.sqrt(slope2))
+    nearest = max(slope - np.float32(2) * np.float32(np.sqrt(width2)), np.float32(0))
+    a2 = alpha * alpha
+    fall, rise = a2 + slope2, a2 + nearest * nearest
+    boost = min(fall / rise * (fall / rise), _BOOST)
+    share = min(width2 / (a2 + nearest * nearest), np.float32(1))
+    made: np.float32 = contribution * boost * share
+    return made
+
+
+@kernel
+def _split(
+    place: int,
+    size: int,
+    parts: int,
+    runs: Pool,
+    first: int,
+    last: int,
+    block: F64,
+    leaf: F32,
+    nx: np.float32,
+    ny: np.float32,
+    nz: np.float32,
+    axes: F64,
+    least: np.float32,
+    out: F32,
+    found: int,
+) -> int:
+    """Writes the visible light of `parts` equal parts of leaves place … place + size − 1 as nodes."""
+    leaves = len(leaf) - 1
+    low, high = first, last
+    while low < high:
+        between = (low + high) >> 1
+        if int(runs[2 * between + 1]) < place:
+            low = between + 1
+        else:
+            high = between
+    run = low
+    step = size // parts
+    sums = np.empty(SUMS, np.float32)
+    for part in range(parts):
+        begin = place + part * step
+        end = begin + step
+        for i in range(SUMS):
+            sums[i] = np.float32(0)
+        while run < last and int(runs[2 * run]) < end:
+            a, b = max(int(runs[2 * run]), begin), min(int(runs[2 * run + 1]) + 1, end)
+            for i in range(SUMS):
+                sums[i] += leaf[b, i] - leaf[a, i]
+            one, other = a // BLOCK, b // BLOCK
+            if one != other:
+                for i in range(SUMS):
+                    sums[i] += np.float32(block[other, i] - block[one, i])
+            if int(runs[2 * run + 1]) >= end:
+                break
+            run += 1
+        power = sums[0]
+        arrives = nx * sums[1] + ny * sums[2] + nz * sums[3]
+        if power > least and arrives > 0 and found < len(out):
+            moment = np.float32(np.sqrt(sums[1] * sums[1] + sums[2] * sums[2] + sums[3] * sums[3]))
+            cell = (leaves + begin) // step
+            write_node(sums, power, moment, nx, ny, nz, axes, np.float32(1), cell, out[found])
+            found += 1
+    return found
+
+
+@kernel
+def focus_nodes(
+    begin: int,
+    stop: int,
+    block_number: int,
+    points: I64,
+    first: I64,
+    data: F32,
+    spread: F32,
+    cells: I32,
+    run_first: I64,
+    runs: Pool,
+    owner: I32,
+    wanted: Bools,
+    positions: F32,
+    normals: F32,
+    material: I32,
+    eye: F32,
+    address: I64,
+    terms: I64,
+    offset: I64,
+    shapes: F32,
+    weights: F32,
+    alpha: F32,
+    block: F64,
+    leaf: F32,
+    tolerance: np.float32,
+    out: F32,
+    detail: F32,
+    nodes: I64,
+) -> int:
+    """Nodes of those of points[begin:stop] that are wanted and owned by this block, split where needed.
+
+    weights (M, T) luminous coefficients of each material's terms, alpha (M,) widths of lobes (0: leave the
+    material alone); tolerance is a node's share of the point's radiance. `out` and `detail` as in
+    `gather_light`; nodes (P,) are counted, -1: the point keeps what it has. Returns how many points fitted.
+    """
+    leaves = len(leaf) - 1
+    axes = np.empty((3, 3))
+    wo = np.empty(3, np.float32)
+    made = np.empty((MOST_NODES, NODE), np.float32)  # finished nodes
+    waiting = np.empty((2, MOST_NODES, NODE), np.float32)
+    wi = np.empty(3 * MOST_NODES, np.float32)
+    values = np.empty(weights.shape[1] * MOST_NODES, np.float32)
+    place = 0
+    for number in range(begin, stop):
+        if len(out) - 6 * place < 6 * MOST_NODES:
+            return number - begin
+        p = points[number]
+        nodes[number] = -1
+        if p < 0 or owner[p] != block_number or not wanted[p]:
+            continue
+        m = material[p]
+        count = first[number + 1] - first[number]
+        if alpha[m] <= 0 or count == 0:
+            continue
+        nx, ny, nz = normals[p, 0], normals[p, 1], normals[p, 2]
+        frame(nx, ny, nz, axes)
+        local_view(positions[p], eye, axes, wo)
+        shape = shapes[offset[m] :]
+        base = 6 * first[number]
+        current = 0
+        for node in range(count):
+            for line in range(6):
+                waiting[0, node, line] = data[base + line * count + node]
+            waiting[0, node, 6] = spread[first[number] + node]
+            waiting[0, node, 7] = cells[first[number] + node]
+        found = 0
+        differs = False
+        total = np.float32(0)
+        for turn in range(ROUNDS):
+            now, later = waiting[current], waiting[1 - current]
+            for node in range(count):
+                wi[node], wi[count + node], wi[2 * count + node] = now[node, 0], now[node, 1], now[node, 2]
+            call_address(address[m], shape, wo, count, wi, values)
+            if turn == 0:
+                for node in range(count):
+                    light = now[node, 3] + now[node, 4] + now[node, 5]
+                    total += light * _luminous(values, count, terms[m], weights[m], node)
+            allowed = tolerance * total
+            next_count = 0
+            for node in range(count):
+                light = now[node, 3] + now[node, 4] + now[node, 5]
+                contribution = light * _luminous(values, count, terms[m], weights[m], node)
+                error = lobe_error(
+                    now[node, 0], now[node, 1], now[node, 2], wo, now[node, 6], contribution, light, alpha[m]
+                )
+                cell = int(now[node, 7])
+                level = 0
+                while (2 << level) <= cell:
+                    level += 1
+                size = leaves >> level
+                room = MOST_NODES - next_count - found - (count - node) > (1 << LEVELS)
+                if error > allowed and size > 1 and room and turn + 1 < ROUNDS:
+                    levels = 1
+                    while levels < LEVELS and (size >> levels) > 1 and error > allowed * (1 << levels):
+                        levels += 1
+                    next_count = _split(
+                        cell * size - leaves,
+                        size,
+                        1 << levels,
+                        runs,
+                        run_first[number],
+                        run_first[number + 1],
+                        block,
+                        leaf,
+                        nx,
+                        ny,
+                        nz,
+                        axes,
+                        np.float32(0),
+                        later,
+                        next_count,
+                    )
+                    differs = True
+                else:
+                    for line in range(NODE):
+                        made[found, line] = now[node, line]
+                    found += 1
+            if next_count == 0:
+                break
+            count = next_count
+            current = 1 - current
+        if not differs:
+            continue
+        nodes[number] = found
+        for line in range(6):
+            for node in range(found):
+                out[6 * place + line * found + node] = made[node, line]
+        for node in range(found):
+            detail[2 * (place + node)] = made[node, 6]
+            detail[2 * (place + node) + 1] = made[node, 7]
+        place += found
+    return stop - begin
