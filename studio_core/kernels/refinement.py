@@ -1,4 +1,4 @@
-"""Where hits on a mesh lie after it was refined, and what old vertices tell of new ones."""
+"""Where hits on a mesh lie after it was refined, what old vertices tell of new ones, and what faces miss."""
 
 from __future__ import annotations
 
@@ -93,3 +93,41 @@ def lift(between: I64, mass: F64) -> None:
         if between[i, 0] != between[i, 1]:
             mass[between[i, 0]] += 0.5 * mass[i]
             mass[between[i, 1]] += 0.5 * mass[i]
+
+
+@kernel
+def far_corners(
+    positions: F32, corners: I64, radiance: F32, order: I64, start: I64, count: I64, missed: F64
+) -> None:
+    """missed (E,): the more that linear functions of an edge's two faces miss at each other's far corner.
+
+    corners (F, 3) vertices of faces; order, start, count: half-edges by edge, as `topology.Edges` has them.
+    A far corner's foot in the other face's plane counts; root mean square over the channels of radiance
+    (V, 3). −1 for edges that do not have two faces.
+    """
+    for e in range(len(count)):
+        missed[e] = -1.0
+        if count[e] != 2:
+            continue
+        for turn in range(2):
+            face, across = order[start[e] + turn] // 3, order[start[e] + 1 - turn]
+            i, j, k = corners[face, 0], corners[face, 1], corners[face, 2]
+            far = corners[across // 3, (across + 2) % 3]
+            g11, g12, g22, r1, r2 = 0.0, 0.0, 0.0, 0.0, 0.0
+            for c in range(3):
+                a = float(positions[i, c])
+                p, q, r = positions[j, c] - a, positions[k, c] - a, positions[far, c] - a
+                g11 += p * p
+                g12 += p * q
+                g22 += q * q
+                r1 += p * r
+                r2 += q * r
+            det = max(g11 * g22 - g12 * g12, 1e-12 * g11 * g22 + 1e-300)
+            u, v = (r1 * g22 - r2 * g12) / det, (r2 * g11 - r1 * g12) / det
+            w = min(max(1.0 - u - v, -4.0), 4.0)  # of needles only so far
+            u, v = min(max(u, -4.0), 4.0), min(max(v, -4.0), 4.0)
+            square = 0.0
+            for c in range(radiance.shape[1]):
+                miss = w * radiance[i, c] + u * radiance[j, c] + v * radiance[k, c] - radiance[far, c]
+                square += miss * miss
+            missed[e] = max(missed[e], np.sqrt(square / radiance.shape[1]))

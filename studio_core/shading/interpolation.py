@@ -22,9 +22,9 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from studio_core.kernels.refinement import lift
+from studio_core.kernels.refinement import far_corners, lift
 from studio_core.scene.shading_mesh import NO_BACK
-from studio_core.scene.topology import edges
+from studio_core.scene.topology import Edges, edges
 from studio_core.scene.transform import rotation_matrix
 from studio_core.scene.world_mesh import WorldMesh
 from studio_core.session import View
@@ -100,12 +100,12 @@ def edge_errors(mesh: WorldMesh, hits: Hits, radiance: F32, valid: Bools) -> Edg
     count = samples[faces].astype(np.float64)
     if not len(faces):
         return EdgeErrors(np.zeros((0, 2), np.int64), np.zeros(0), np.zeros(0), 0.0, 1.0)
-    shown = radiance[corners].astype(np.float64)
-    mean = float((count * shown.mean(axis=(1, 2))).sum() / count.sum())
+    level = radiance.mean(axis=1, dtype=np.float64)
+    mean = float((count * level[corners].mean(axis=1)).sum() / count.sum())
     around = edges(corners)
     ends = around.ends
     gap = _size(radiance[ends[:, 0]].astype(np.float64) - radiance[ends[:, 1]])
-    jump = _far_corners(mesh, corners, shown, around.of, around.order, around.start, around.count)
+    jump = _missed(mesh, corners, radiance, around)
     bend = np.minimum(jump, gap) / np.maximum(gap, 1e-30)  # 1: a step; 0: as straight as can be
     expected = np.minimum(STEP * gap, jump * (SMOOTH + (STEP - SMOOTH) * bend))
     between = parents(mesh)
@@ -143,33 +143,17 @@ def _dot(a: F64, b: F64) -> F64:
     return np.asarray(np.einsum("nk,nk->n", a, b))
 
 
-def _far_corners(
-    mesh: WorldMesh, corners: I64, shown: F64, of: I64, order: I64, start: I64, count: I64
-) -> F64:
+def _missed(mesh: WorldMesh, corners: I64, radiance: F32, around: Edges) -> F64:
     """(E,) the most that faces at an edge, or at one of their other edges, miss at the far corner across.
 
     inf where no face there has a neighbour.
     """
-    at = mesh.positions[corners].astype(np.float64)
-    two = np.flatnonzero(count == 2)
-    first, second = order[start[two]], order[start[two] + 1]
-    missed = np.full((2, len(count)), -1.0)
-    for row, (here, there) in enumerate(((first, second), (second, first))):
-        face, other, far = here // 3, there // 3, (there + 2) % 3
-        a, b, c = (at[face, k] for k in range(3))
-        along, across, out = b - a, c - a, at[other, far] - a
-        g11, g12, g22 = _dot(along, along), _dot(along, across), _dot(across, across)
-        r1, r2 = _dot(along, out), _dot(across, out)
-        det = np.maximum(g11 * g22 - g12 * g12, 1e-12 * g11 * g22 + 1e-300)
-        u, v = (r1 * g22 - r2 * g12) / det, (r2 * g11 - r1 * g12) / det
-        weights = np.clip(np.stack([1 - u - v, u, v], axis=1), -4, 4)
-        guess = np.einsum("nk,nkc->nc", weights, shown[face])
-        missed[row, two] = _size(guess - shown[other, far])
-    of_edge = missed.max(axis=0)
-    of_face = of_edge[of].max(axis=1)
+    of_edge = np.empty(len(around.count))
+    tables = (around.order, around.start, around.count)
+    far_corners(mesh.positions, corners, radiance, *tables, of_edge)
+    of_face = of_edge[around.of].max(axis=1)
     of_face[of_face < 0] = np.inf
-    made = np.maximum.reduceat(of_face[order // 3], start)
-    return np.asarray(made)
+    return np.asarray(np.maximum.reduceat(of_face[around.order // 3], around.start))
 
 
 def _pixels(mesh: WorldMesh, view: View, ends: I64) -> F64:

@@ -92,6 +92,7 @@ class AdaptiveSurfaceStage(SurfaceStage):
         self._radiance = VertexRadiance(services)
         self._proven: dict[NodeId, Refinement] = {}
         self._proposed: dict[NodeId, Refinement] | None = None
+        self._content: tuple[tuple[Scene, Radiance, Hits], Adaptive] | None = None  # needs no more rounds
         self._has_dropped = False  # in this update: once, so that it ends
         self.reports: list[RoundReport] = []
 
@@ -123,15 +124,18 @@ class AdaptiveSurfaceStage(SurfaceStage):
         """Whether splitting edges would bring the picture nearer to its target; `reports` tell of each."""
         if self._proposed is not None:
             self._proven, self._proposed = self._proposed, None
-        if not rounds:
-            self.reports, self._has_dropped = [], False
         adaptive, surfaces = self._adaptive(frame.params), made[Surfaces]
         radiance: Radiance = made[Radiance]
         if adaptive is None or not radiance.final or radiance.surfaces.mesh is not surfaces.mesh:
             return False
+        hits = radiance.hits if radiance.hits is not None else made[Hits]
+        asked = (frame.scene, radiance, hits)
+        if self._content is not None and _same(asked, self._content[0]) and adaptive == self._content[1]:
+            return False
+        if not rounds:
+            self.reports, self._has_dropped = [], False
         shown = self._radiance(frame.scene, radiance)
         job.checkpoint()
-        hits = radiance.hits if radiance.hits is not None else made[Hits]
         errors = edge_errors(surfaces.mesh, hits, shown, radiance.valid)
         job.checkpoint()
         saved = partial(squares_saved, surfaces.mesh, hits, shown, radiance.valid)
@@ -147,7 +151,7 @@ class AdaptiveSurfaceStage(SurfaceStage):
         worth = len(edges) > 0 and room > WORTH * len(edges)
         proposed = self._split(surfaces, errors.ends[edges], room, job) if worth else None
         self.reports.append(RoundReport(errors.relative_rmse, len(surfaces.mesh), len(edges)))
-        self._proposed = proposed
+        self._proposed, self._content = proposed, (asked, adaptive) if proposed is None else None
         return proposed is not None
 
     def abandon(self) -> None:
@@ -216,6 +220,10 @@ class AdaptiveSurfaceStage(SurfaceStage):
                 break
             del kept[surfaces.sources[index][0]]
         return kept if len(kept) < len(self._proven) else self._proven
+
+
+def _same(asked: tuple[object, ...], before: tuple[object, ...]) -> bool:
+    return all(one is other for one, other in zip(asked, before, strict=True))
 
 
 def _has(refined_mesh: WorldMesh, base: WorldMesh, meshes: Mapping[int, ShadingMesh]) -> bool:

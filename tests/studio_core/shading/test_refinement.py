@@ -151,7 +151,9 @@ def test_rounds_bring_the_picture_nearer_to_the_truth(refined, services) -> None
     for estimate, real in zip(estimates, errors, strict=True):
         assert 0.4 * real < estimate < 2.5 * real
     refined.check()
+    judged = refined.stage.reports
     assert refined.look() is last
+    assert refined.stage.reports is judged  # not even looked at again
 
 
 def test_few_vertices_in_the_right_places_beat_many_everywhere(refined, services) -> None:
