@@ -109,10 +109,12 @@ class SelfVisibility:
     ) -> None:
         """Makes the cuts of vertices `rows` of the mesh; ray origins and unit normals (n, 3) in the world.
 
-        Nothing is kept when it is cancelled.
+        What is not finite sees nothing. Nothing is kept when it is cancelled.
         """
         frame = OwnFrame.of(part, directions)
         inward = part.from_world
+        whole = np.isfinite(np.concatenate([origins, normals], axis=1)).all(axis=1, keepdims=True)
+        origins, normals = np.where(whole, origins, 0.0), np.where(whole, normals, 0.0)
         starts = (origins @ inward[:, :3].T + inward[:, 3]).astype(np.float32)
         upward = (normals @ (inward[:, :3] / part.scale).T).astype(np.float32)
         done: dict[int, tuple[I64, I32, int, U8, int]] = {}

@@ -45,17 +45,20 @@ def made_of(
     see_through: tuple[int, ...] = (),
     edge: float = 0.3,
     box: Geometry | None = None,
+    backend: str = "auto",
+    shift: tuple[float, float, float] = (0.0, 0.0, 0.0),
 ) -> Little:
-    """A floor and boxes of 0.6 m, or other things, at places."""
+    """A floor and boxes of 0.6 m, or other things, at places, all shifted."""
+    places = tuple(Transform(shift) @ place for place in places)
     geometries = [floor(4.0), *([box or cube(0.6)] * (len(places) - 1))]
     items = [(f"o{i}", g, place, [0]) for i, (g, place) in enumerate(zip(geometries, places, strict=True))]
-    mesh = world_mesh(items, edge, cache=MeshCache())
+    mesh = world_mesh(items, edge, origin=shift, cache=MeshCache())
     objects, identities = [], []
     for index, (geometry, place) in enumerate(zip(geometries, places, strict=True)):
         stops = np.full(len(geometry.faces), index not in see_through)
         objects.append(CasterObject(geometry.positions, geometry.faces, geometry.key, place.matrix(), stops))
         identities.append((geometry.key, index in see_through))
-    return Little(mesh, RayCaster(objects), identities, geometries)
+    return Little(mesh, RayCaster(objects, backend), identities, geometries)
 
 
 @pytest.fixture

@@ -274,6 +274,18 @@ def test_objects_that_stop_no_light(place: Any, workers: Workers, sky_tree: Ligh
     assert path.irradiance(every(room), sky_tree).min() > 0
 
 
+def test_both_tracers_agree(place: Any, workers: Workers, sky_tree: LightTree) -> None:
+    rooms = [place(backend=name) for name in ("embree", "bvh")]
+    one, two = (path_of(room, workers).irradiance(every(room, 3), sky_tree) for room in rooms)
+    assert relative_rmse(one, two) < 1e-3
+
+
+def test_far_from_the_origin_nothing_changes(place: Any, workers: Workers, sky_tree: LightTree) -> None:
+    near, far = place(), place(shift=(8192.0, -4096.0, 1024.0))
+    found = path_of(far, workers).irradiance(every(far, 3), sky_tree)
+    assert relative_rmse(found, path_of(near, workers).irradiance(every(near, 3), sky_tree)) < 2e-3
+
+
 def test_an_object_more_is_another_room(place: Any, workers: Workers, sky_tree: LightTree) -> None:
     small, large = place(places=(Transform(), Transform((0.0, 0.31, 0.0)))), place()
     path = path_of(small, workers)

@@ -93,6 +93,17 @@ def test_only_wanted_samples_are_traced_and_none_of_a_cancelled_run(room: Any, w
     assert field.records.sizes.cuts == 4
 
 
+def test_vertices_that_are_not_finite_see_nothing(room: Any, workers: Workers) -> None:
+    store = SelfVisibility(3)
+    starts = np.array([[0.0, 3.0, 0.0], [np.nan, 0.0, 0.0], [0.0, 3.0, 0.0]])
+    normals = np.array([[0.0, 1.0, 0.0], [0.0, 1.0, 0.0], [0.0, np.inf, 0.0]])
+    part, occluded8 = room.shadow.part(1), room.shadow.handles().occluded8
+    store.trace(np.arange(3), starts, normals, part, occluded8, direction_set(K), 0.01, workers)
+    assert leaves_of(store.records, 0, binary=False).max() > 0.9
+    assert leaves_of(store.records, 1, binary=False).tolist() == [0.0] * (1 << K)
+    assert leaves_of(store.records, 2, binary=False).tolist() == [0.0] * (1 << K)
+
+
 def test_sizes_in_three_codes() -> None:
     sizes = CutSizes(2, 100, 30) + CutSizes(1, 20, 0)
     assert sizes == CutSizes(3, 120, 30)
