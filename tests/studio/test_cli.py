@@ -778,6 +778,7 @@ def test_render_measures_its_own_error(run: Run, room: Path) -> None:
     error = json.loads(said.out)["error"]
     assert error["picture"]["places"] == 50
     assert 0 < error["picture"]["relative_rmse"] < 2
+    assert error["picture"]["p99"] > 0
     assert error["vertices"]["relative_rmse"] > 0
     assert len(error["layers"]) >= 1
 

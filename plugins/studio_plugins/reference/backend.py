@@ -97,6 +97,8 @@ class ReferenceStage:
         valid = np.zeros(len(surfaces.mesh.positions), np.bool_)
         valid[points] = True
         last = int(params.directions).bit_length() - 1
+        if lighting.tree is not None:
+            last = min(last, lighting.tree.k)  # fewer while a hand turns the light
         steps = STEPS if lighting.environment is not None and job.listened_to else ()
         levels = [*(level for level in steps if level < last), last]
         made: Radiance | None = None

@@ -6,6 +6,7 @@ import dataclasses
 
 import numpy as np
 import pytest
+from scenes import sky
 
 from studio_core.contract import Services
 from studio_core.kernels.directions import DirectionList, direction_set
@@ -13,9 +14,12 @@ from studio_core.kernels.light_tree import LightTree
 from studio_core.kernels.raycast import CasterObject, RayCaster
 from studio_core.kernels.visibility import trace_visibility
 from studio_core.parallel import Workers
-from studio_core.scene.diff import Changes, diff
+from studio_core.scene.diff import Changes, diff, view_changed
+from studio_core.scene.geometry import Image
 from studio_core.scene.nodes import Environment, MeshObject
 from studio_core.scene.transform import Transform
+from studio_core.shading import lighting
+from studio_core.shading.artifacts import Lighting
 from studio_core.shading.brute_force import HEAVY, VisibilityBits, split_light
 from studio_core.shading.frame import Frame
 from studio_core.shading.job import Job
@@ -131,6 +135,59 @@ def test_moving_an_object_equals_starting_afresh(services, host, little_scene):
             kept.layers[layer].irradiance, fresh.layers[layer].irradiance, rtol=2e-3, atol=2e-3
         )
         assert np.abs(kept.layers[layer].irradiance - fresh.layers[layer].irradiance).mean() < 1e-5
+
+
+def test_a_turning_light_is_summed_over_the_leaves_there_are(services, host, little_scene, monkeypatch):
+    monkeypatch.setattr(lighting, "TURNING", 11)
+    image = np.array(sky(64).pixels)
+    image[9, 20] = [9e3, 7e3, 4e3]
+    scene = little_scene(environment=Image(image))
+    backend = host.get("backend", "reference")
+    params = backend_params(backend, {"directions": "4096", "vertices": 600})
+    view = scene_view(scene, None, 40, 30)
+    pipe = pipeline(services, host)
+    assert pipe.update(Frame(scene, view, params, 1), Changes(), Job("first")).directions == 4096
+    turned = scene.with_nodes(dataclasses.replace(next(scene.of(Environment)), azimuth=30.0))
+    moving = pipe.update(Frame(turned, view, params, 2, True), diff(scene, turned), Job("turned"))
+    assert moving.directions == 2048
+    rest = pipe.update(Frame(turned, view, params, 3), view_changed(), Job("rest"))
+    assert rest.directions == 4096
+    fresh = shade(turned, view, backend, params, services)
+    np.testing.assert_array_equal(rest.layers["sky"].irradiance, fresh.layers["sky"].irradiance)
+    lit = fresh.layers["sky"].irradiance
+    assert np.sqrt(((moving.layers["sky"].irradiance - lit) ** 2).mean()) < 0.05 * lit.mean()
+
+
+def test_a_sun_casts_the_shadow_of_its_own_direction(services, host, little_scene):
+    """The floor in the cube's shadow loses the sun's irradiance, the open floor has all of it."""
+    image = np.full((64, 128, 3), 1e-3, np.float32)
+    image[16, 32] = 1e4
+    scene = little_scene(environment=Image(image))
+    params = backend_params(
+        host.get("backend", "reference"), {"directions": "1024", "vertices": 3000, "everywhere": True}
+    )
+    pipe = pipeline(services, host)
+    made = pipe.update(Frame(scene, scene_view(scene, None, 16, 12), params, 1), Changes(), Job("first"))
+    sun = pipe.artifact(Lighting).sun
+    towards = (sun.directions * sun.irradiance.sum(axis=1, keepdims=True)).sum(axis=0)
+    towards /= np.linalg.norm(towards)
+    mesh = made.surfaces.mesh
+    places = mesh.positions + mesh.origin
+    floor = (mesh.object == made.surfaces.nodes.index("floor")) & (mesh.normals[:, 1] > 0.9)
+    expected = float((sun.irradiance[:, 0] * sun.directions[:, 1]).sum())
+    along = places + np.linspace(0.02, 3, 300)[:, None, None] * towards
+
+    def behind(grown):  # a cube that is larger or smaller by what a penumbra takes
+        inside = (np.abs(along[..., [0, 2]]) < 0.5 + grown).all(axis=2) & (along[..., 1] < 1.0 + grown)
+        return inside.any(axis=0)
+
+    open_floor = np.abs(places[:, [0, 2]]).max(axis=1) > 0.55
+    found = made.layers["sky"].irradiance[:, 0] / expected
+    well_lit, dark = floor & open_floor & ~behind(0.25), floor & open_floor & behind(-0.2)
+    assert well_lit.sum() > 50
+    assert dark.sum() > 5
+    np.testing.assert_allclose(found[well_lit], 1, atol=0.02)
+    assert found[dark].max() < 0.1
 
 
 def test_one_and_two_threads_agree_bit_for_bit(host, little_scene):
