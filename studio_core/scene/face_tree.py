@@ -77,7 +77,9 @@ def _within(before: ShadingMesh, after: ShadingMesh, face: Ints, child: Ints) ->
     old = after.faces[child] < len(before)
     ends = np.where(old[..., None], after.faces[child][..., None], ends)
     places = (ends[..., None] == corners[:, None, None, :]).mean(axis=2)  # corners of the part, as rows
-    inverse = np.rint(np.linalg.inv(places))
+    a, b, c = (places[:, k] for k in range(3))
+    columns = np.stack([np.cross(b, c), np.cross(c, a), np.cross(a, b)], axis=2)
+    inverse = np.rint(columns / (a * columns[:, :, 0]).sum(axis=1)[:, None, None])
     # λ = (1 - u - v, u, v) in the face is λ · inverse in the part.
     u, v = inverse[:, :, 1], inverse[:, :, 2]
     rows = (u[:, 0], u[:, 1] - u[:, 0], u[:, 2] - u[:, 0], v[:, 0], v[:, 1] - v[:, 0], v[:, 2] - v[:, 0])
