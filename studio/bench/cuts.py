@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from studio.bench import cuts_growth, cuts_keeping, cuts_peers
+from studio.bench import cuts_growth, cuts_keeping, cuts_paper, cuts_peers
 from studio.bench.cuts_cases import CASES, Case, State
 from studio.bench.cuts_measure import Editor, Errors, Measured, Shaded, Truth, fitting, measured
 from studio.bench.cuts_scenes import ENVIRONMENTS, NATIVE, Rooms, prefix_of
@@ -46,6 +46,7 @@ class Setup:
     converged: int = 384
     settles: int = 3
     opens: int = 3
+    paper: cuts_paper.Sizes = dataclasses.field(default_factory=cuts_paper.Sizes)
     growth: cuts_growth.Steps | None = dataclasses.field(default_factory=cuts_growth.Steps)
 
 
@@ -61,6 +62,7 @@ QUICK = Setup(
     converged=64,
     settles=1,
     opens=1,
+    paper=cuts_paper.Sizes(receivers=500, samples=20, points=100, shells=(8, 16)),
     growth=None,
 )
 
@@ -109,10 +111,12 @@ class Suite:
                     for case in cases:
                         self._case(editor, case, environment, prefix, method)
         for environment in ENVIRONMENTS:
-            for case in cuts_keeping.SETTLES:
-                cuts_keeping.settle(self, environment, case)
+            for name in cuts_keeping.SETTLES:
+                cuts_keeping.settle(self, environment, name)
         for prefix, method in self.methods.items():
             cuts_keeping.opening(self, prefix, method)
+        if "paper/" in self.methods:
+            cuts_paper.tables(self, self.setup.paper)
         if self.setup.growth is not None:
             cuts_growth.run(self, self.setup.growth)
 

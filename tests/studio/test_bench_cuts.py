@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from scenes import little_scene, sky
 
-from studio.bench import cuts, cuts_growth, cuts_peers
+from studio.bench import cuts, cuts_growth, cuts_paper, cuts_peers
 from studio.bench.cuts_cases import CASES, CHAIR, ONE, Case, State, orbits, turns
 from studio.bench.cuts_keeping import SETTLES
 from studio.bench.cuts_measure import Errors, Shaded, changed, kept_bytes
@@ -350,6 +350,7 @@ TINY = cuts.Setup(
     converged=16,
     settles=1,
     opens=1,
+    paper=cuts_paper.Sizes(receivers=50, samples=2, points=20, shells=(2, 3)),
     growth=cuts_growth.Steps((500, 1000), (cuts_growth.FEW, 6), (10, 11), 1),
 )
 TIMES = {"ms", "primary_ms", "compose_ms", "picture_ms", "first_picture_ms"}
@@ -399,6 +400,12 @@ def test_the_suite_has_every_promised_row(monkeypatch: pytest.MonkeyPatch, noisy
         assert found[f"{paper}precompute", "bytes"] > 800
         assert report.details[f"{paper}precompute"]["told"] == {"bytes": 800, "cached": 1}
         assert found[f"{paper}precompute", "cached_ms"] > 0
+    for shells in TINY.paper.shells:
+        assert 0 < found[f"paper/shells-{shells}", "irradiance_rel_rmse"] < 1
+        assert found[f"paper/shells-{shells}", "samples_possible"] == 2 * 6 * shells**3  # two objects
+    assert found["paper/table", "average_nodes_of_an_svc"] >= 1
+    said = report.details["paper/table"]["paper"]
+    assert said["svc_and_vcf_with_heights_whole_fields"] == 270e6
     assert {f"growth/{kind}" for kind in ("vertices", "objects", "directions")} <= {case for case, _ in found}
 
 
