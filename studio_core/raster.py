@@ -31,6 +31,7 @@ from studio_core.kernels.compose import (
     shade_hits,
 )
 from studio_core.kernels.facing import shown_sides
+from studio_core.kernels.tonemap import prepare
 from studio_core.parallel import Workers
 from studio_core.scene.diff import Aspect
 from studio_core.scene.nodes import Environment, Light, Scene
@@ -69,6 +70,7 @@ class PictureStage:
     def __init__(self, services: Services) -> None:
         self._coefficients = CoefficientTable(services.registry)
         self._compositor = Compositor(services.workers)
+        prepare()  # or the window would wait for it
 
     def run(self, frame: Frame, inputs: Inputs, job: Job) -> Picture:
         """The picture; no light is summed here. Radiance may come with hits of its own, on a finer mesh."""

@@ -17,6 +17,7 @@ Kind = Literal["srgb", "filmic", "raw"]
 KINDS: tuple[str, ...] = get_args(Kind)
 LABELS = {"srgb": "Colour-true (sRGB)", "filmic": "Filmic (ACES)", "raw": "Raw (linear)"}
 
+THUMBNAIL = 1 << 16  # pixels: up to here NumPy is quick enough, and no compiler need be loaded
 _STEPS = 1 << 16  # entries of a curve's table: 0.05 of an 8-bit step where sRGB is steepest
 _BLOCK = 1 << 14  # pixels at a time: stays in the cache
 _TO_FILM = np.array(
@@ -25,6 +26,7 @@ _TO_FILM = np.array(
 _FROM_FILM = np.array(
     [[1.60475, -0.53108, -0.07367], [-0.10208, 1.10813, -0.00605], [-0.00327, -0.07276, 1.07602]], np.float32
 )
+_NO_FILM = np.zeros((0, 3), np.float32)
 
 
 def tonemap(
@@ -40,6 +42,12 @@ def tonemap(
     made = np.empty(flat.shape, np.uint8)
     table = _table(kind == "raw")
     gain = np.float32(2.0**exposure)
+    if len(flat) > THUMBNAIL:
+        from studio_core.kernels.display import display
+
+        film = (_TO_FILM, _FROM_FILM) if kind == "filmic" else (_NO_FILM, _NO_FILM)
+        display(flat, gain, *film, table, made)
+        return made.reshape(linear.shape)
     for start in range(0, len(flat), _BLOCK):
         light = flat[start : start + _BLOCK] * gain
         if kind == "filmic":
@@ -52,9 +60,14 @@ def tonemap(
     return made.reshape(linear.shape)
 
 
+def prepare() -> None:
+    """Compiles or loads the kernel, on a thread that may take its time, before a window shows a picture."""
+    tonemap(np.zeros((1, THUMBNAIL + 1, 3), np.float32))
+
+
 def _film(light: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:
     """Hill's fit, (N, 3) linear Rec.709 to display-linear Rec.709."""
-    clipped = np.clip(light, np.float32(0), np.float32(1e6))
+    clipped = np.fmin(np.fmax(light, np.float32(0)), np.float32(1e6))
     x = clipped @ _TO_FILM.T
     bent = (x * (x + np.float32(0.0245786)) - np.float32(0.000090537)) / (
         x * (np.float32(0.983729) * x + np.float32(0.4329510)) + np.float32(0.238081)

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 from oracles import tonemap as oracle
 
-from studio_core.kernels.tonemap import KINDS, LABELS, tonemap
+from studio_core.kernels.tonemap import KINDS, LABELS, THUMBNAIL, tonemap
 
 light = hnp.arrays(
     np.float32, (2, 3, 3), elements=st.floats(0, 2.0**17, width=32) | st.floats(0, 1, width=32)
@@ -46,6 +46,21 @@ def test_large_pictures_are_done_block_by_block() -> None:
     rows = np.concatenate([tonemap(row[None], 0.5, "filmic") for row in linear])
     assert np.abs(whole.astype(int) - rows).max() <= 1
     assert set(LABELS) == set(KINDS)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_pictures_of_a_screen_look_like_thumbnails(kind: str) -> None:
+    rng = np.random.default_rng(2)
+    linear = (2.0 ** rng.uniform(-20, 8, (300, 301, 3))).astype(np.float32)
+    odd = [[np.nan] * 3, [-1.0] * 3, [np.inf] * 3, [1e30] * 3, [0.0] * 3, [np.nan, 0.5, np.inf], [1.0] * 3]
+    linear[7, 50 : 50 + len(odd)] = odd
+    assert linear.size // 3 > THUMBNAIL
+    whole = tonemap(linear, 0.5, kind)
+    rows = np.concatenate([tonemap(row[None], 0.5, kind) for row in linear])
+    difference = np.abs(whole.astype(int) - rows)
+    assert difference.max() <= 1
+    assert (difference > 0).mean() < 1e-3
+    np.testing.assert_array_equal(whole[7, 50 : 50 + len(odd)], rows[7, 50 : 50 + len(odd)])
 
 
 def test_unknown_views_are_refused() -> None:
