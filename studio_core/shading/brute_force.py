@@ -113,17 +113,17 @@ class Beams:
     light: F32
 
 
-def beams(lighting: Lighting, level: int) -> list[Beams]:
+def beams(lighting: Lighting, level: int, quarters: bool = True) -> list[Beams]:
     """All that the environment's layer is summed over: leaves of 2^level, parts of some, samples of suns."""
-    found = split_light(lighting.tree, level) if lighting.tree is not None else []
+    found = split_light(lighting.tree, level, quarters) if lighting.tree is not None else []
     if lighting.sun is not None:
         samples = DirectionList(lighting.sun.directions.astype(np.float32))
         found.append(Beams("suns", samples, _filled(lighting.sun.irradiance, samples)))
     return found
 
 
-def split_light(tree: LightTree, level: int) -> list[Beams]:
-    """The leaves of 2^level (of fewer, where the tree is coarser), the brightest of them in quarters.
+def split_light(tree: LightTree, level: int, quarters: bool = True) -> list[Beams]:
+    """The leaves of 2^level (of fewer, where the tree is coarser), the brightest of them in `quarters`.
 
     One visibility ray stands for a leaf. Where a leaf holds over `HEAVY` of all light (and four times its
     even share), the error of a shadow's edge in it would show, so its four parts are looked at one by one
@@ -132,15 +132,15 @@ def split_light(tree: LightTree, level: int) -> list[Beams]:
     level = min(level, tree.k)
     leaves = np.array(tree.coarsened(level).radiance)
     found = [Beams(f"2^{level}", direction_set(level), leaves)]
-    if level + 2 > tree.k:
+    if level + 2 > tree.k or not quarters:
         return found
     light = leaves.sum(axis=1)
     heavy = np.flatnonzero(light > max(HEAVY, 4 / len(light)) * light.sum())
     if len(heavy):
         leaves[heavy] = 0
-        quarters = (heavy[:, None] * 4 + np.arange(4)).ravel()
-        parts = DirectionList.of_leaves(level + 2, quarters)
-        bright = _filled(tree.coarsened(level + 2).radiance[quarters], parts)
+        inside = (heavy[:, None] * 4 + np.arange(4)).ravel()
+        parts = DirectionList.of_leaves(level + 2, inside)
+        bright = _filled(tree.coarsened(level + 2).radiance[inside], parts)
         found.append(Beams(f"parts of 2^{level}", parts, bright))
     return found
 
@@ -161,13 +161,14 @@ def environment_layer(
     level: int,
     workers: Workers,
     job: Job,
+    quarters: bool = True,
 ) -> LayerRadiance:
     """The environment's layer at unit gain for `points`: see `beams`."""
     layer = blank_layer(mesh)
     if not len(points):
         return layer
     local_eye = (eye - mesh.origin).astype(np.float32)
-    for beam in beams(lighting, level):
+    for beam in beams(lighting, level, quarters):
         directions = beam.directions
         step = max(POINTS, BLOCK_BYTES * 8 // max(directions.size, 1))
         for first in range(0, len(points), step):

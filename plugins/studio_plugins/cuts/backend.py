@@ -2,17 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import dataclasses
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from studio_core.contract import Services
 from studio_core.params import param
+from studio_core.scene.diff import Changes
+from studio_core.scene.nodes import Scene
+from studio_core.session import View
+from studio_core.shading.frame import Frame
+from studio_core.shading.job import Job
+from studio_core.shading.pipeline import Pipeline
 from studio_core.shading.stages import Adaptive, SurfaceParams, common_stages
 from studio_plugins.cuts.focus_stage import FocusStage
 from studio_plugins.cuts.quality import quality
 from studio_plugins.cuts.radiance_stage import RadianceStage
-from studio_plugins.cuts.stages import LightStage, VisibilityStage
+from studio_plugins.cuts.stages import EXACT, PAPER, LightStage, VisibilityStage
 
 
 @dataclass(frozen=True)
@@ -32,6 +39,21 @@ class Params(SurfaceParams):
         choices=tuple(str(1 << level) for level in range(10, 18)),
         advanced=True,
     )
+    method: str = param(
+        EXACT,
+        "Method",
+        "exact: visibility traced; svc-vcf: the paper's precomputed shadow fields, for comparison",
+        choices=(EXACT, PAPER),
+        advanced=True,
+    )
+    shells: int = param(
+        32,
+        "Shells",
+        "Of the paper's shadow fields, and cells along a side of each",
+        low=4,
+        high=128,
+        advanced=True,
+    )
     lamp_samples: int = param(
         64, "Lamp samples", "Shadow rays to an area lamp", low=1, high=256, advanced=True
     )
@@ -41,7 +63,9 @@ class Params(SurfaceParams):
 
 
 def _adaptive(params: Params) -> Adaptive | None:
-    return Adaptive(target=quality(params.quality).picture) if params.refine else None
+    if not params.refine or params.method != EXACT:
+        return None
+    return Adaptive(target=quality(params.quality).picture)
 
 
 class Cuts:
@@ -60,6 +84,19 @@ class Cuts:
             FocusStage(services),
             RadianceStage(services),
         ]
+
+    def precompute(
+        self, scene: Scene, view: View, params: Any, services: Services, job: Job
+    ) -> Mapping[str, int | float]:
+        """Brings what is kept on disk for a scene to completeness: light over directions, visibility.
+
+        `vertices_traced` is 0 where all was there already.
+        """
+        frame = Frame(scene, view, dataclasses.replace(params, refine=False), 1)
+        stages = self.stages(services)
+        Pipeline(stages).update(frame, Changes(), job)
+        visibility = next(stage for stage in stages if isinstance(stage, VisibilityStage))
+        return visibility.complete(frame, job)
 
 
 BACKEND = Cuts()

@@ -106,16 +106,17 @@ def gather_light(
         elif light > 0.0:
             made[0, 0], made[0, 1], made[0, 2] = 0.0, 0.0, 1.0
             made[0, 3], made[0, 4], made[0, 5] = red, green, blue
+            made[0, 6], made[0, 7] = 0.0, 1.0
             found = 1
         nodes[number] = found
         for line in range(6):
             for node in range(found):
                 out[6 * place + line * found + node] = made[node, line]
         run_count[number] = count if glossy[p] and found else 0
+        for node in range(found):
+            detail[2 * (place + node)] = made[node, 6]
+            detail[2 * (place + node) + 1] = made[node, 7]
         if glossy[p]:
-            for node in range(found):
-                detail[2 * (place + node)] = made[node, 6]
-                detail[2 * (place + node) + 1] = made[node, 7]
             out_runs[kept : kept + 2 * run_count[number]] = runs[: 2 * run_count[number]]
             kept += 2 * run_count[number]
         place += found

@@ -121,3 +121,14 @@ def gather_records(pool: Pool, start: I64, length: npt.NDArray[np.int32], target
     """Copies records to their new places."""
     for row in range(len(start)):
         out[target[row] : target[row] + length[row]] = pool[start[row] : start[row] + length[row]]
+
+
+@kernel
+def relabel(pool: Pool, length: npt.NDArray[np.int32], names: I64) -> None:
+    """Renames the slots of records that lie one after the other: slot s becomes names[s]."""
+    place = 0
+    for row in range(len(length)):
+        end = place + length[row]
+        while place < end:
+            pool[place] = names[pool[place]]
+            place += 2 + 2 * int(pool[place + 1])

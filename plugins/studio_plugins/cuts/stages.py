@@ -7,7 +7,7 @@ place; the artifacts handed on are small and new whenever something in those tab
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -26,15 +26,20 @@ from studio_core.shading.artifacts import (
     Shapes,
     Surfaces,
 )
+from studio_core.shading.cache import DiskCache
 from studio_core.shading.frame import Frame
 from studio_core.shading.job import Job
 from studio_core.shading.pipeline import Inputs
 from studio_core.shading.primary import visible_vertices
+from studio_plugins.cuts import keeping
 from studio_plugins.cuts.choose import Prefix
 from studio_plugins.cuts.lamps import LampCache, Source, lamp_source, sphere
 from studio_plugins.cuts.light_cache import LightCache
 from studio_plugins.cuts.lobes import LobeTable
 from studio_plugins.cuts.nodes import NodeTable
+from studio_plugins.cuts.paper.height_cuts import HIGHEST_K
+from studio_plugins.cuts.paper.settings import PaperParams
+from studio_plugins.cuts.paper_light import PaperLight
 from studio_plugins.cuts.quality import Quality, quality
 from studio_plugins.cuts.store import VisibilityStore
 
@@ -42,6 +47,7 @@ F32 = npt.NDArray[np.float32]
 I64 = npt.NDArray[np.int64]
 Bools = npt.NDArray[np.bool_]
 
+EXACT, PAPER = "exact", "svc-vcf"
 FIRST_LEVELS = (10, 12)
 """Fineness of the first pictures of a scene of which nothing is known."""
 SLOW, QUICK = 0.07, 0.015
@@ -68,8 +74,10 @@ class VisibilityStage:
 
     def __init__(self, services: Services) -> None:
         self._workers = services.workers
+        self._cache: DiskCache | None = services.cache
         self._store: VisibilityStore | None = None
         self._preview = FIRST_LEVELS[-1]
+        self._asked: tuple[Surfaces, Casters] | None = None
 
     def run(self, frame: Frame, inputs: Inputs, job: Job) -> Seen:
         """The previous where nobody sees anything else; publishes coarse steps of what is new."""
@@ -86,6 +94,11 @@ class VisibilityStage:
             mask = visible_vertices(surfaces, hits)
         points = np.flatnonzero(mask)
         before = store.stamp
+        self._asked = surfaces, inputs[Casters]
+        if frame.params.method != EXACT:
+            return self._unless_same(inputs.previous, Seen(store, points, mask, True, k), generation, before)
+        if self._cache is not None and not frame.moving and store.stamp == 0:
+            keeping.load(self._cache, store, *self._asked)
         if frame.moving:
             self._look(points, job)
         else:
@@ -97,17 +110,37 @@ class VisibilityStage:
                         job.publish(Seen(store, points, mask, False, level))
             store.trace(points, job)
         exact = not len(store.unknown(points))
-        previous: Seen | None = inputs.previous
-        if (
+        made = Seen(store, points, mask, exact, k if exact else self._preview)
+        return self._unless_same(inputs.previous, made, generation, before)
+
+    def _unless_same(self, previous: Seen | None, made: Seen, generation: int, before: int) -> Seen:
+        """The previous where it says the same of the same records."""
+        same = (
             previous is not None
-            and store.generation == generation
-            and store.stamp == before
-            and previous.store is store
-            and previous.exact == exact
-            and np.array_equal(previous.mask, mask)
-        ):
-            return previous
-        return Seen(store, points, mask, exact, k if exact else self._preview)
+            and made.store.generation == generation
+            and made.store.stamp == before
+            and previous.store is made.store
+            and previous.exact == made.exact
+            and np.array_equal(previous.mask, made.mask)
+        )
+        return previous if same and previous is not None else made
+
+    def complete(self, frame: Frame, job: Job) -> Mapping[str, int]:
+        """What no picture needs yet: hidden vertices are traced too, and all is kept on disk.
+
+        Returns how many vertices were traced, and bytes that were kept.
+        """
+        store = self._store
+        if store is None or self._asked is None or frame.params.method != EXACT:
+            return {}
+        surfaces, casters = self._asked
+        rows = keeping.unrefined_rows(surfaces)
+        missing = len(store.unknown(rows))
+        if not missing:
+            return {"vertices_traced": 0, "bytes": 0}
+        store.trace(rows, job)
+        kept = keeping.save(self._cache, store, surfaces, casters) if self._cache is not None else 0
+        return {"vertices_traced": missing, "bytes": kept}
 
     def _look(self, points: I64, job: Job) -> None:
         assert self._store is not None
@@ -145,6 +178,7 @@ class LightStage:
     def __init__(self, services: Services) -> None:
         self._workers = services.workers
         self._environment = LightCache(services.workers)
+        self._paper = PaperLight(services.workers)
         self._lamps: dict[NodeId, LampCache] = {}
         self._lobes = LobeTable()
         self._placed: dict[NodeId, tuple[object, Transform]] = {}
@@ -161,8 +195,14 @@ class LightStage:
         summed = looked = 0
         if lighting.environment is not None and lighting.tree is not None:
             tree = fitted(lighting.tree, seen.store.k)
-            self._environment.follow(seen.store, tree, wanted.tolerance)
-            summed = self._environment.gather(seen.store, mesh, seen.points, glossy, job)
+            if frame.params.method == PAPER:
+                shells, k = frame.params.shells, min(tree.k, HIGHEST_K)
+                paper = PaperParams(k=k, shells=shells, cells=shells)
+                tree = tree.coarsened(k)
+                summed = self._paper.gather(surfaces, inputs[Casters], tree, seen.points, paper, job)
+            else:
+                self._environment.follow(seen.store, tree, wanted.tolerance)
+                summed = self._environment.gather(seen.store, mesh, seen.points, glossy, job)
         shadows = self._moved(surfaces, inputs[Casters])
         sources = self._sources(lighting, frame, wanted)
         self._lamps = {node: self._lamps.get(node) or LampCache(self._workers) for node in sources}
@@ -182,21 +222,23 @@ class LightStage:
                 coarse if frame.moving else None,
                 job,
             )
-        layers = tuple(self._tables(lighting))
+        exact = frame.params.method == EXACT
+        layers = tuple(self._tables(lighting, exact))
         newest = tuple(table.newest for _, tables in layers for table in tables)
         previous: Arriving | None = inputs.previous
         if previous is not None and previous.newest == newest and _same(previous.layers, layers):
             return previous
-        there = lighting.environment is not None
+        there = lighting.environment is not None and exact
         environment = self._environment.table if there else None
         return Arriving(layers, newest, environment, self._environment.prefix, summed, looked)
 
-    def _tables(self, lighting: Lighting) -> list[tuple[NodeId, tuple[NodeTable, ...]]]:
+    def _tables(self, lighting: Lighting, exact: bool) -> list[tuple[NodeId, tuple[NodeTable, ...]]]:
         made: list[tuple[NodeId, tuple[NodeTable, ...]]] = []
         if lighting.environment is not None:
             node = lighting.environment.id
             suns = (self._lamps[node].table,) if node in self._lamps else ()
-            made.append((node, (self._environment.table, self._environment.difference, *suns)))
+            own = (self._environment.table, self._environment.difference) if exact else (self._paper.table,)
+            made.append((node, (*own, *suns)))
         made.extend((lamp.node, (self._lamps[lamp.node].table,)) for lamp in lighting.lamps)
         return made
 
@@ -205,7 +247,7 @@ class LightStage:
     ) -> dict[NodeId, tuple[Source, Source | None]]:
         """Every lamp, and the suns under the environment's name, exact and as while something moves."""
         made: dict[NodeId, tuple[Source, Source | None]] = {}
-        sun = getattr(lighting, "sun", None)
+        sun = lighting.sun
         if lighting.environment is not None and sun is not None and len(sun.directions):
             ends = np.column_stack([sun.directions, np.zeros(len(sun.directions))])
             made[lighting.environment.id] = (Source(ends, None, np.asarray(sun.irradiance, np.float32)), None)

@@ -18,6 +18,7 @@ from studio_core.scene.shading_mesh import ShadingMesh
 from studio_core.shading.artifacts import Casters, Surfaces
 from studio_core.shading.job import Job
 from studio_plugins.cuts.beams import BeamTable, parts_of
+from studio_plugins.cuts.intervals import gather_records, relabel
 from studio_plugins.cuts.poses import Poses, stale
 from studio_plugins.cuts.records import NEVER, Records
 from studio_plugins.cuts.tracer import COUNTS, HORIZON, PACKETS, RAYS, SKIPPED, TRACED, trace_records
@@ -203,6 +204,35 @@ class VisibilityStore:
             "skipped_packets": SKIPPED,
         }
         return {name: int(self.counts[column]) for name, column in names.items()}
+
+    # -- to keep elsewhere ---------------------------------------------------------------------------
+
+    def packed(self, rows: Points) -> tuple[npt.NDArray[Any], I32]:
+        """Records of these vertices one after the other, and their lengths; objects by their number.
+
+        Raises ValueError where one of them is not known, or tells of an object that is gone.
+        """
+        if (self.exact.epoch[rows] != self._now).any():
+            raise ValueError("there are vertices whose visibility is not known")
+        length = self.exact.length[rows]
+        ends = np.cumsum(length, dtype=np.int64)
+        pool = np.empty(int(ends[-1]) if len(ends) else 0, self.exact.pool.dtype)
+        gather_records(self.exact.pool, self.exact.start[rows], length, ends - length, pool)
+        names = np.full(len(self._alive), len(self._slots), np.int64)
+        names[self._slots] = np.arange(len(self._slots))
+        relabel(pool, length, names)
+        return pool, length
+
+    def unpack(self, rows: Points, pool: npt.NDArray[Any], length: I32) -> bool:
+        """Takes over records that were packed for the same objects; False where they cannot be that."""
+        if len(rows) != len(length) or int(length.sum()) != len(pool) or pool.dtype != self.exact.pool.dtype:
+            return False
+        own = pool.copy()
+        relabel(own, length, np.append(self._slots, 0))
+        self.stamp += 1
+        self.exact.write(rows, [own], length, self.stamp)
+        self.exact.epoch[rows] = self._now
+        return True
 
     # -- tracing -------------------------------------------------------------------------------------
 

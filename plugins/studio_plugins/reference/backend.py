@@ -41,6 +41,9 @@ class Params(SurfaceParams):
         "How many directions light comes from; more shows sharper shadows",
         choices=tuple(str(1 << level) for level in range(10, 18)),
     )
+    quarters: bool = param(
+        True, "Split bright directions", "Look at the brightest directions in four parts each", advanced=True
+    )
     lamp_samples: int = param(64, "Lamp samples", "Shadow rays to an area lamp or a sun", low=1, high=256)
     everywhere: bool = param(False, "Hidden places too", "Also light what the camera does not see")
 
@@ -114,6 +117,7 @@ class ReferenceStage:
                     level,
                     self._workers,
                     job,
+                    params.quarters,
                 )
             final = level == last
             traced = inputs[VisibilityBits]
