@@ -3,14 +3,13 @@
 `settle`: an object was dragged and stands where it began; how long until the refined picture is final, and
 how wrong that is: matte materials that Mitsuba has, `settle-glossy` with its metal, `settle-own` the room as
 it is, where only our own brute force can tell. `precompute`: everything with an empty cache folder, and with
-a full one. `memory`: what is stored, `memory-working`: what one view's shading takes on top.
+a full one. `memory`: visibility as it is held, `memory-working`: what one view's shading takes on top.
 """
 
 from __future__ import annotations
 
 import dataclasses
 import time
-from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -66,48 +65,44 @@ def opening(suite: Suite, prefix: str, method: str) -> None:
     base = suite.base("windows", "glossy")
     params = suite.params(method=method)
     make = getattr(suite.backend, "precompute", None)
-    cold: dict[str, list[float]] = {}
-    warm: dict[str, list[float]] = {}
-    told: Mapping[str, int | float] = {}
+    taken: dict[str, list[float]] = {}
+    told: list[dict[str, int | float]] = []
     size = 0
+
+    def note(metric: str, seconds: float) -> None:
+        taken.setdefault(metric, []).append(1000 * seconds)
+
     for number in range(suite.setup.opens):
         services = suite.services_in(f"{method}-{number}")
-        for into in (cold, warm):
-            editor = Editor(suite.backend, services)
-            step, _ = editor.go(base, params, moving=False)
-            into.setdefault("first", []).append(step.first)
-            into.setdefault("all", []).append(step.seconds)
+        first, _ = Editor(suite.backend, services).go(base, params, moving=False)
+        note("first_picture_ms", first.first)
+        note("view_ms", first.seconds)
         if make is not None:
             services = suite.services_in(f"{method}-{number}-all")
-            for into in (cold, warm):
+            for metric in ("ms", "cached_ms"):
                 started = time.perf_counter()
-                told = make(base.scene, base.view, params, services, Job("bench"))
-                into.setdefault("made", []).append(time.perf_counter() - started)
-        size = folder_bytes(suite.folder / f"{method}-{number}{'-all' if make is not None else ''}")
-    key = "made" if make is not None else "all"
-    for metric, values in (
-        ("ms", cold[key]),
-        ("cached_ms", warm[key]),
-        ("first_picture_ms", cold["first"]),
-        ("cached_first_picture_ms", warm["first"]),
-        ("view_ms", cold["all"]),
-        ("cached_view_ms", warm["all"]),
-    ):
+                told.append(dict(make(base.scene, base.view, params, services, Job("bench"))))
+                note(metric, time.perf_counter() - started)
+        editor = Editor(suite.backend, services)
+        again, _ = editor.go(base, params, moving=False)
+        note("cached_first_picture_ms", again.first)
+        note("cached_view_ms", again.seconds)
+        size = folder_bytes(suite.folder / f"{method}-{number}{'' if make is None else '-all'}")
+    for metric, values in taken.items():
         timing = Timing.of(values)
-        suite.report.add(name, metric, 1000 * timing.median, "ms", 1000 * timing.spread)
+        suite.report.add(name, metric, timing.median, "ms", timing.spread)
     suite.report.add(name, "bytes", size, "B")
     if told:
-        suite.detail(name, told=dict(told))
-    memory(suite, prefix, editor, step.counts)
+        suite.detail(name, told=told[:2])
+    memory(suite, prefix, editor)
 
 
-def memory(suite: Suite, prefix: str, editor: Editor, counts: Mapping[str, int]) -> None:
-    """Bytes that the backend says it holds, and those of all arrays found in its artifacts."""
-    for case, count in (("memory", "bytes_stored"), ("memory-working", "bytes_working")):
-        if count in counts:
-            suite.report.add(f"{prefix}{case}", "bytes", counts[count], "B")
+def memory(suite: Suite, prefix: str, editor: Editor) -> None:
+    """Bytes of the arrays that the backend's first own stage keeps (visibility), and of the later ones."""
     found = held(editor)
-    suite.report.add(f"{prefix}memory", "found_bytes", sum(found.values()), "B")
+    first = next(iter(found), "")
+    suite.report.add(f"{prefix}memory", "bytes", found.get(first, 0), "B")
+    suite.report.add(f"{prefix}memory-working", "bytes", sum(found.values()) - found.get(first, 0), "B")
     suite.detail(f"{prefix}memory", bytes=found)
 
 
@@ -119,12 +114,10 @@ def held(editor: Editor) -> dict[str, int]:
     own = (type(editor.backend).__module__.rpartition(".")[0],)
     found: dict[str, int] = {}
     seen: set[int] = set()
-    stages = [stage for stage in editor.pipeline.stages if type(stage).__module__.startswith(own)]
-    for stage in stages:
-        if stage.gives is not Radiance:
-            artifact = editor.pipeline.artifact(stage.gives)
-            found[stage.gives.__name__] = kept_bytes(artifact, own, seen)
-    found["stages"] = sum(kept_bytes(stage, own, seen) for stage in stages)
+    for stage in editor.pipeline.stages:
+        if type(stage).__module__.startswith(own):
+            given = None if stage.gives is Radiance else editor.pipeline.artifact(stage.gives)
+            found[stage.gives.__name__] = sum(kept_bytes(part, own, seen) for part in (given, stage))
     return found
 
 
