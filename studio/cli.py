@@ -222,7 +222,7 @@ def parser() -> argparse.ArgumentParser:
     precompute = verb("precompute", "make now what a backend keeps on disk for a project")
     precompute.add_argument("project", type=Path, metavar="PROJECT")
     precompute.add_argument("--camera", metavar="NAME", help="from here first (default: the first camera)")
-    _backend_options(precompute, "cuts")
+    _backend_options(precompute)
 
     export = verb("export", "write a project as GLB, or as a Mitsuba 3 scene folder")
     export.add_argument("project", type=Path, metavar="PROJECT")
@@ -242,7 +242,7 @@ def parser() -> argparse.ArgumentParser:
     return made
 
 
-def _backend_options(verb: argparse.ArgumentParser, default: str = "reference") -> None:
+def _backend_options(verb: argparse.ArgumentParser, default: str = "cuts") -> None:
     verb.add_argument(
         "--backend", default=default, metavar="ID", help=f"how light is summed (default: {default})"
     )

@@ -69,7 +69,7 @@ class Session:
     def __init__(self, view: View | None = None) -> None:
         self.view = view or View()
         self.selection: tuple[NodeId, ...] = ()
-        self.backend = "reference"
+        self.backend = "cuts"
         self.params: Mapping[str, Any] = frozen_map()
         self.exposure = 0.0
         self.tonemap = "srgb"

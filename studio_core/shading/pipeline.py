@@ -78,6 +78,15 @@ class Refining(Protocol):
         ...
 
 
+@runtime_checkable
+class Completing(Protocol):
+    """A stage that can do in idle time what no picture needs yet, such as hidden places."""
+
+    def complete(self, frame: Frame, job: Job) -> object:
+        """Do it; cancelled, it keeps what is done. Called after `run` came through for `frame`."""
+        ...
+
+
 @dataclass
 class _Record:
     pending: Changes
@@ -217,6 +226,12 @@ class Pipeline:
             line = StageRun(type(stage).__name__, ran, record.stamp != before, seconds, self.rounds)
             self.report.append(line)
         return self._records[-1].artifact
+
+    def complete(self, frame: Frame, job: Job) -> None:
+        """What stages can do in idle time, after `frame` was brought up to date."""
+        for stage in self.stages:
+            if isinstance(stage, Completing):
+                stage.complete(frame, job)
 
     def _flow(self, frame: Frame, index: int, made: Mapping[type, Any], job: Job, artifact: Any) -> Any:
         """What the stages after `index` make of a partial artifact; nothing of it is kept."""

@@ -11,7 +11,7 @@ import logging
 import queue
 import threading
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
 from studio_core.errors import Cancelled
@@ -82,6 +82,15 @@ def _attempt(work: Callable[[], Any]) -> tuple[Any, Exception | None]:
         return None, RuntimeError(f"a stage tried to leave the program: {error}")
 
 
+@dataclass(frozen=True)
+class _Spare:
+    """Work for when nothing waits, and who is told of its result."""
+
+    label: str
+    work: Callable[[Frame, Job], Any]
+    done: Callable[[Frame, Any], None] | None
+
+
 class Scheduler:
     """Feeds one pipeline with frames.
 
@@ -89,7 +98,8 @@ class Scheduler:
     `failed(frame, error)`; `progress(job)`; `idle()` when nothing is left to do. All on the owner's thread.
 
     `spare(pipeline, frame, job)` is run when a frame is finished and nothing waits, such as the error
-    meter; its result comes as `measured(frame, result)`. Any request cancels it.
+    meter; its result comes as `measured(frame, result)`. If it `completes`, the pipeline then does what no
+    picture needs yet. Any request cancels either.
     """
 
     def __init__(
@@ -99,6 +109,7 @@ class Scheduler:
         post: Callable[[Callable[[], None]], None] = lambda call: call(),
         label: str = "Shading",
         spare: Callable[[Pipeline, Frame, Job], Any] | None = None,
+        completes: bool = False,
     ) -> None:
         self.shown: Signal[[Frame, Any, bool]] = Signal()
         self.failed: Signal[[Frame, Exception]] = Signal()
@@ -117,6 +128,7 @@ class Scheduler:
         self._waiting: tuple[Frame, Changes] | None = None
         self._closed = False
         self._spare = spare
+        self._completes = completes
         self._spare_job: Job | None = None
 
     @property
@@ -185,7 +197,7 @@ class Scheduler:
                 self._show(frame, result, True)
         finally:  # a receiver that fails stops nothing
             if error is None and self._waiting is None and self._job is None and not self._closed:
-                self._measure(frame)
+                self._spare_time(frame, self._spare_steps())
             else:
                 self._go_on()
 
@@ -195,29 +207,45 @@ class Scheduler:
         elif self._job is None:
             self.idle.emit()
 
-    def _measure(self, frame: Frame) -> None:
-        spare = self._spare
-        if spare is None:
+    def _spare_time(self, frame: Frame, steps: tuple[_Spare, ...]) -> None:
+        """Runs the first of the steps, then the others, while nobody asks for anything."""
+        if not steps:
             self._go_on()
             return
-        job = Job("Measuring the error", on_progress=lambda j: self._post(lambda: self.progress.emit(j)))
+        step, rest = steps[0], steps[1:]
+        job = Job(step.label, on_progress=lambda j: self._post(lambda: self.progress.emit(j)))
         self._job = self._spare_job = job
 
         def run() -> None:
-            result, error = _attempt(lambda: spare(self.pipeline, frame, job))
+            result, error = _attempt(lambda: step.work(frame, job))
             self._post(lambda: finish(result, error))
 
         def finish(result: Any, error: Exception | None) -> None:
             self._job = self._spare_job = None
+            idle = error is None and self._waiting is None and not self._closed
             try:
                 if error is not None and not isinstance(error, Cancelled):
                     self.failed.emit(frame, error)
-                elif error is None and self._waiting is None and not self._closed:
-                    self.measured.emit(frame, result)
-            finally:
-                self._go_on()
+                elif idle and step.done is not None:
+                    step.done(frame, result)
+            finally:  # a receiver may have asked for something
+                if idle and self._waiting is None and self._job is None:
+                    self._spare_time(frame, rest)
+                else:
+                    self._go_on()
 
         self._executor.submit(run)
+
+    def _spare_steps(self) -> tuple[_Spare, ...]:
+        spare = self._spare
+        steps = []
+        if spare is not None:
+            steps.append(
+                _Spare("Measuring the error", lambda f, j: spare(self.pipeline, f, j), self.measured.emit)
+            )
+        if self._completes:
+            steps.append(_Spare("Looking at hidden places", self.pipeline.complete, None))
+        return tuple(steps)
 
     def _show(self, frame: Frame, artifact: Any, final: bool) -> None:
         if frame.revision >= self._last_shown and not self._closed:

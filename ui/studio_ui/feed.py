@@ -104,6 +104,12 @@ class LazyPipeline:
         params = self._shading.params(self._backend, frame.params)
         return self._made.update(dataclasses.replace(frame, params=params), changes, job)
 
+    def complete(self, frame: Frame, job: Job) -> None:
+        """See `Pipeline.complete`."""
+        if self._made is not None:
+            params = self._shading.params(self._backend, frame.params)
+            self._made.complete(dataclasses.replace(frame, params=params), job)
+
     def measure(self, frame: Frame, job: Job) -> MeasuredError | None:
         """The error of what was last made; see `Shading.measure`."""
         return self._shading.measure(self._made, frame, job) if self._made is not None else None
@@ -229,7 +235,7 @@ class PictureFeed:
 
     def _schedule(self) -> Scheduler:
         pipeline: Any = LazyPipeline(self._shading, self._backend)
-        scheduler = Scheduler(pipeline, self._executor, self._post, spare=self._spare)
+        scheduler = Scheduler(pipeline, self._executor, self._post, spare=self._spare, completes=True)
         scheduler.shown.connect(self._show)
         scheduler.failed.connect(self._fail)
         scheduler.progress.connect(self.progress.emit)
