@@ -74,9 +74,9 @@ def accumulate(runs: Pool, count: int, block: F64, leaf: F32, before: F32) -> No
 
 @kernel
 def sums_until(
-    place: int, runs: Pool, first: int, last: int, before: F32, block: F64, leaf: F32, out: F32
+    place: int, runs: Pool, first: int, last: int, before: F32, block: F64, leaf: F32, out: F32, row: int
 ) -> int:
-    """out (16,) becomes the sums over the runs' leaves before `place`.
+    """out[row] (16,) becomes the sums over the runs' leaves before `place`.
 
     Returns the first of the runs first … last − 1 that ends at or after it, or `last`.
     """
@@ -88,16 +88,16 @@ def sums_until(
         else:
             high = between
     for i in range(SUMS):
-        out[i] = before[low, i]
+        out[row, i] = before[low, i]
     if low < last:
         start = int(runs[2 * low])
         if start < place:
             for i in range(SUMS):
-                out[i] += leaf[place, i] - leaf[start, i]
+                out[row, i] += leaf[place, i] - leaf[start, i]
             one, other = start // BLOCK, place // BLOCK
             if one != other:
                 for i in range(SUMS):
-                    out[i] += np.float32(block[other, i] - block[one, i])
+                    out[row, i] += np.float32(block[other, i] - block[one, i])
     return low
 
 
@@ -113,21 +113,22 @@ def write_node(
     sign: np.float32,
     cell: int,
     out: F32,
+    row: int,
 ) -> None:
-    """out (NODE,) becomes direction (3, in the shading frame), irradiance (3), spread and cell of a node.
+    """out[row] (NODE,) becomes a node's direction (3, in the shading frame), irradiance (3), spread, cell.
 
     sums (16,) of its light, of which `power` and `moment` are luminance and the length of its vector.
     """
     scale = np.float32(1) / moment
     x, y, z = sums[1] * scale, sums[2] * scale, sums[3] * scale
-    out[0] = axes[0, 0] * x + axes[0, 1] * y + axes[0, 2] * z
-    out[1] = axes[1, 0] * x + axes[1, 1] * y + axes[1, 2] * z
-    out[2] = axes[2, 0] * x + axes[2, 1] * y + axes[2, 2] * z
-    out[3] = sign * max(nx * sums[5] + ny * sums[6] + nz * sums[7], np.float32(0))
-    out[4] = sign * max(nx * sums[9] + ny * sums[10] + nz * sums[11], np.float32(0))
-    out[5] = sign * max(nx * sums[13] + ny * sums[14] + nz * sums[15], np.float32(0))
-    out[6] = max(np.float32(2) * (power - moment) / power, np.float32(0))
-    out[7] = cell
+    out[row, 0] = axes[0, 0] * x + axes[0, 1] * y + axes[0, 2] * z
+    out[row, 1] = axes[1, 0] * x + axes[1, 1] * y + axes[1, 2] * z
+    out[row, 2] = axes[2, 0] * x + axes[2, 1] * y + axes[2, 2] * z
+    out[row, 3] = sign * max(nx * sums[5] + ny * sums[6] + nz * sums[7], np.float32(0))
+    out[row, 4] = sign * max(nx * sums[9] + ny * sums[10] + nz * sums[11], np.float32(0))
+    out[row, 5] = sign * max(nx * sums[13] + ny * sums[14] + nz * sums[15], np.float32(0))
+    out[row, 6] = max(np.float32(2) * (power - moment) / power, np.float32(0))
+    out[row, 7] = cell
 
 
 @kernel
@@ -173,14 +174,13 @@ def choose_nodes(
                 half = size >> 1
                 stack_size[depth] = half
                 depth += 1
-                run = sums_until(place + half, runs, low_run, high_run, before, block, leaf, stack[depth])
+                run = sums_until(place + half, runs, low_run, high_run, before, block, leaf, stack, depth)
                 stack_size[depth], stack_run[depth] = half, min(run + 1, high_run)
                 continue
             for i in range(SUMS):
                 here[i] = stack[depth, i] - low[i]
-            write_node(
-                here, power, moment, nx, ny, nz, axes, sign, (len(leaf) - 1 + place) // size, made[found]
-            )
+            cell = (len(leaf) - 1 + place) // size
+            write_node(here, power, moment, nx, ny, nz, axes, sign, cell, made, found)
             found += 1
         place += size
         for i in range(SUMS):

@@ -29,11 +29,14 @@ _BOOST = np.float32(1e4)
 
 
 @kernel
-def _luminous(values: F32, count: int, terms: int, weights: F32, node: int) -> np.float32:
-    total = np.float32(0)
+def _luminous(values: F32, count: int, terms: int, weights: F32, material: int, out: F32) -> None:
+    """out[node] becomes the luminous reflectance of the first `count` nodes."""
+    for node in range(count):
+        out[node] = 0
     for k in range(terms):
-        total += weights[k] * values[k * count + node]
-    return total
+        weight = weights[material, k]
+        for node in range(count):
+            out[node] += weight * values[k * count + node]
 
 
 @kernel
@@ -41,19 +44,20 @@ def lobe_error(
     x: np.float32,
     y: np.float32,
     z: np.float32,
-    wo: F32,
+    ox: np.float32,
+    oy: np.float32,
+    oz: np.float32,
     spread: np.float32,
     contribution: np.float32,
-    light: np.float32,
     alpha: np.float32,
 ) -> np.float32:
     """Estimated error of a node in direction (x, y, z) with mean square angle `spread`, in radiance.
 
-    contribution is irradiance times BRDF at the direction, light the irradiance; alpha the lobe's width as
-    the slope of half vectors. A lobe that stands inside the node shows by the rise of
+    (ox, oy, oz) leads to the eye; contribution is irradiance times BRDF; alpha the lobe's width as the
+    slope of half vectors. A lobe that stands inside the node shows by the rise of
     (1 + tan² / α²)^-2 from the node's direction to where the node comes nearest to the lobe.
     """
-    hx, hy, hz = x + wo[0], y + wo[1], z + wo[2]
+    hx, hy, hz = x + ox, y + oy, z + oz
     length = np.float32(np.sqrt(hx * hx + hy * hy + hz * hz))
     along = max(np.float32(0.5) * length, _LEAST_COSINE)  # cosine between light and half vector
     up = max(hz / length, np.float32(1e-3))
@@ -86,8 +90,12 @@ def _split(
     least: np.float32,
     out: F32,
     found: int,
+    most: int,
 ) -> int:
-    """Writes the visible light of `parts` equal parts of leaves place … place + size − 1 as nodes."""
+    """Writes the visible light of `parts` equal parts of leaves place … place + size − 1 as rows of out.
+
+    From row `found` on and not beyond `most`; returns where they end.
+    """
     leaves = len(leaf) - 1
     low, high = first, last
     while low < high:
@@ -117,10 +125,10 @@ def _split(
             run += 1
         power = sums[0]
         arrives = nx * sums[1] + ny * sums[2] + nz * sums[3]
-        if power > least and arrives > 0 and found < len(out):
+        if power > least and arrives > 0 and found < most:
             moment = np.float32(np.sqrt(sums[1] * sums[1] + sums[2] * sums[2] + sums[3] * sums[3]))
             cell = (leaves + begin) // step
-            write_node(sums, power, moment, nx, ny, nz, axes, np.float32(1), cell, out[found])
+            write_node(sums, power, moment, nx, ny, nz, axes, np.float32(1), cell, out, found)
             found += 1
     return found
 
@@ -166,9 +174,10 @@ def focus_nodes(
     axes = np.empty((3, 3))
     wo = np.empty(3, np.float32)
     made = np.empty((MOST_NODES, NODE), np.float32)  # finished nodes
-    waiting = np.empty((2, MOST_NODES, NODE), np.float32)
+    waiting = np.empty((2 * MOST_NODES, NODE), np.float32)  # this turn's and the next one's
     wi = np.empty(3 * MOST_NODES, np.float32)
     values = np.empty(weights.shape[1] * MOST_NODES, np.float32)
+    bright = np.empty(MOST_NODES, np.float32)
     place = 0
     for number in range(begin, stop):
         if len(out) - 6 * place < 6 * MOST_NODES:
@@ -189,64 +198,77 @@ def focus_nodes(
         current = 0
         for node in range(count):
             for line in range(6):
-                waiting[0, node, line] = data[base + line * count + node]
-            waiting[0, node, 6] = spread[first[number] + node]
-            waiting[0, node, 7] = cells[first[number] + node]
+                waiting[node, line] = data[base + line * count + node]
+            waiting[node, 6] = spread[first[number] + node]
+            waiting[node, 7] = cells[first[number] + node]
         found = 0
         differs = False
         total = np.float32(0)
         for turn in range(ROUNDS):
-            now, later = waiting[current], waiting[1 - current]
+            now, later = current * MOST_NODES, (1 - current) * MOST_NODES
             for node in range(count):
-                wi[node], wi[count + node], wi[2 * count + node] = now[node, 0], now[node, 1], now[node, 2]
+                wi[node] = waiting[now + node, 0]
+                wi[count + node] = waiting[now + node, 1]
+                wi[2 * count + node] = waiting[now + node, 2]
             call_address(address[m], shape, wo, count, wi, values)
-            if turn == 0:
-                for node in range(count):
-                    light = now[node, 3] + now[node, 4] + now[node, 5]
-                    total += light * _luminous(values, count, terms[m], weights[m], node)
-            allowed = tolerance * total
-            next_count = 0
+            _luminous(values, count, terms[m], weights, m, bright)
             for node in range(count):
-                light = now[node, 3] + now[node, 4] + now[node, 5]
-                contribution = light * _luminous(values, count, terms[m], weights[m], node)
+                row = now + node
+                bright[node] *= waiting[row, 3] + waiting[row, 4] + waiting[row, 5]
+                if turn == 0:
+                    total += bright[node]
+            allowed = tolerance * total
+            next_count = later
+            for node in range(count):
+                row = now + node
                 error = lobe_error(
-                    now[node, 0], now[node, 1], now[node, 2], wo, now[node, 6], contribution, light, alpha[m]
+                    waiting[row, 0],
+                    waiting[row, 1],
+                    waiting[row, 2],
+                    wo[0],
+                    wo[1],
+                    wo[2],
+                    waiting[row, 6],
+                    bright[node],
+                    alpha[m],
                 )
-                cell = int(now[node, 7])
-                level = 0
-                while (2 << level) <= cell:
-                    level += 1
-                size = leaves >> level
-                room = MOST_NODES - next_count - found - (count - node) > (1 << LEVELS)
-                if error > allowed and size > 1 and room and turn + 1 < ROUNDS:
-                    levels = 1
-                    while levels < LEVELS and (size >> levels) > 1 and error > allowed * (1 << levels):
-                        levels += 1
-                    next_count = _split(
-                        cell * size - leaves,
-                        size,
-                        1 << levels,
-                        runs,
-                        run_first[number],
-                        run_first[number + 1],
-                        block,
-                        leaf,
-                        nx,
-                        ny,
-                        nz,
-                        axes,
-                        np.float32(0),
-                        later,
-                        next_count,
-                    )
-                    differs = True
-                else:
-                    for line in range(NODE):
-                        made[found, line] = now[node, line]
-                    found += 1
-            if next_count == 0:
+                if error > allowed and turn + 1 < ROUNDS:
+                    cell = int(waiting[row, 7])
+                    level = 0
+                    while (2 << level) <= cell:
+                        level += 1
+                    size = leaves >> level
+                    room = MOST_NODES - (next_count - later) - found - (count - node)
+                    if size > 1 and room > (1 << LEVELS):
+                        levels = 1
+                        while levels < LEVELS and (size >> levels) > 1 and error > allowed * (1 << levels):
+                            levels += 1
+                        next_count = _split(
+                            cell * size - leaves,
+                            size,
+                            1 << levels,
+                            runs,
+                            run_first[number],
+                            run_first[number + 1],
+                            block,
+                            leaf,
+                            nx,
+                            ny,
+                            nz,
+                            axes,
+                            np.float32(0),
+                            waiting,
+                            next_count,
+                            later + MOST_NODES,
+                        )
+                        differs = True
+                        continue
+                for line in range(NODE):
+                    made[found, line] = waiting[row, line]
+                found += 1
+            if next_count == later:
                 break
-            count = next_count
+            count = next_count - later
             current = 1 - current
         if not differs:
             continue

@@ -124,11 +124,24 @@ def gather_records(pool: Pool, start: I64, length: npt.NDArray[np.int32], target
 
 
 @kernel
-def relabel(pool: Pool, length: npt.NDArray[np.int32], names: I64) -> None:
-    """Renames the slots of records that lie one after the other: slot s becomes names[s]."""
-    place = 0
+def relabel(pool: Pool, length: npt.NDArray[np.int32], names: I64) -> int:
+    """Renames the slots of records that lie one after the other: slot s becomes names[s], in place.
+
+    Segments of slots without a name (−1) are left out, and records that had one get shorter. Returns how
+    many numbers are left.
+    """
+    place = target = 0
     for row in range(len(length)):
         end = place + length[row]
+        first = target
         while place < end:
-            pool[place] = names[pool[place]]
-            place += 2 + 2 * int(pool[place + 1])
+            size = 2 + 2 * int(pool[place + 1])
+            name = names[pool[place]]
+            if name >= 0:
+                for i in range(size):
+                    pool[target + i] = pool[place + i]
+                pool[target] = name
+                target += size
+            place += size
+        length[row] = target - first
+    return target

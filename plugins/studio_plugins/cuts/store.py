@@ -210,7 +210,7 @@ class VisibilityStore:
     def packed(self, rows: Points) -> tuple[npt.NDArray[Any], I32]:
         """Records of these vertices one after the other, and their lengths; objects by their number.
 
-        Raises ValueError where one of them is not known, or tells of an object that is gone.
+        Raises ValueError where one of them is not known. What objects blocked that are gone is left out.
         """
         if (self.exact.epoch[rows] != self._now).any():
             raise ValueError("there are vertices whose visibility is not known")
@@ -218,17 +218,16 @@ class VisibilityStore:
         ends = np.cumsum(length, dtype=np.int64)
         pool = np.empty(int(ends[-1]) if len(ends) else 0, self.exact.pool.dtype)
         gather_records(self.exact.pool, self.exact.start[rows], length, ends - length, pool)
-        names = np.full(len(self._alive), len(self._slots), np.int64)
+        names = np.full(len(self._alive), -1, np.int64)
         names[self._slots] = np.arange(len(self._slots))
-        relabel(pool, length, names)
-        return pool, length
+        return pool[: relabel(pool, length, names)].copy(), length
 
     def unpack(self, rows: Points, pool: npt.NDArray[Any], length: I32) -> bool:
         """Takes over records that were packed for the same objects; False where they cannot be that."""
         if len(rows) != len(length) or int(length.sum()) != len(pool) or pool.dtype != self.exact.pool.dtype:
             return False
         own = pool.copy()
-        relabel(own, length, np.append(self._slots, 0))
+        relabel(own, length.copy(), self._slots)
         self.stamp += 1
         self.exact.write(rows, [own], length, self.stamp)
         self.exact.epoch[rows] = self._now
