@@ -409,6 +409,7 @@ def test_no_verb_without_a_window_loads_qt(files: Path) -> None:
         ["export", "made.lucarne", "-o", "mitsuba"],
         ["demo", "--headless", "-o", "demo.png", *SMALL],
         ["script", "script.py"],
+        ["precompute", "made.lucarne", *QUICK],
         ["doctor"],
     ]
     assert {command[0] for command in commands} | {"bench", "stress"} == set(VERBS)
