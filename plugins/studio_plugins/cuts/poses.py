@@ -39,9 +39,9 @@ class Poses:
         place = np.array([t.translation for t in transforms], np.float64).reshape(-1, 3)
         return Poses(row, turn, scale, place)
 
-    def same(self, other: Poses, slots: I64) -> bool:
-        """Whether nothing is stale and the objects are the same."""
-        return len(self.scale) == len(other.scale) and not stale(self, other, slots).any()
+    def same(self, then: Poses, slots: I64) -> bool:
+        """Whether the objects, those of `slots`, are the same as then and nothing is stale."""
+        return len(self.scale) == len(then.scale) and not stale(then, self, slots).any()
 
 
 def stale(then: Poses, now: Poses, slots: I64) -> Bools:
