@@ -48,7 +48,7 @@ def load_rays(
             length += abs(directions[ray, axis])
             size += abs(origins[ray, axis])
         packet[TFAR, lane] = tfar[ray]
-        if np.isfinite(length) and np.isfinite(size) and length > 0 and tfar[ray] >= 0:
+        if 0 < length < np.inf and size < np.inf and tfar[ray] >= 0:  # isfinite of a sum is folded away
             valid[lane] = -1
             traced += 1
     return traced

@@ -263,7 +263,7 @@ def trace_records(
         ox = float(positions[p, 0]) + epsilon * geometric[p, 0] + inset[p, 0]
         oy = float(positions[p, 1]) + epsilon * geometric[p, 1] + inset[p, 1]
         oz = float(positions[p, 2]) + epsilon * geometric[p, 2] + inset[p, 2]
-        good = np.isfinite(ox + oy + oz + nx + ny + nz)
+        good = abs(ox + oy + oz + nx + ny + nz) < np.inf  # isfinite of a sum is folded away: x − x is 0
         for step in range(-1, count):  # the vertex' own object comes first
             j = r if step < 0 else step
             if step == r:
