@@ -73,20 +73,26 @@ def accumulate(runs: Pool, count: int, block: F64, leaf: F32, before: F32) -> No
 
 
 @kernel
+def index_runs(runs: Pool, count: int, index: I64) -> None:
+    """index[b] (S/64 + 1,) becomes the first run that ends at or after the start of block b, or count."""
+    run = 0
+    for b in range(len(index)):
+        while run < count and int(runs[2 * run + 1]) < BLOCK * b:
+            run += 1
+        index[b] = run
+
+
+@kernel
 def sums_until(
-    place: int, runs: Pool, first: int, last: int, before: F32, block: F64, leaf: F32, out: F32, row: int
+    place: int, runs: Pool, index: I64, last: int, before: F32, block: F64, leaf: F32, out: F32, row: int
 ) -> int:
     """out[row] (16,) becomes the sums over the runs' leaves before `place`.
 
-    Returns the first of the runs first … last − 1 that ends at or after it, or `last`.
+    Returns the first of the runs before `last` that ends at or after it, or `last`.
     """
-    low, high = first, last
-    while low < high:
-        between = (low + high) >> 1
-        if int(runs[2 * between + 1]) < place:
-            low = between + 1
-        else:
-            high = between
+    low = min(int(index[place // BLOCK]), last)
+    while low < last and int(runs[2 * low + 1]) < place:
+        low += 1
     for i in range(SUMS):
         out[row, i] = before[low, i]
     if low < last:
@@ -135,6 +141,7 @@ def write_node(
 def choose_nodes(
     runs: Pool,
     count: int,
+    index: I64,
     block: F64,
     leaf: F32,
     before: F32,
@@ -156,7 +163,6 @@ def choose_nodes(
     low = np.zeros(SUMS, np.float32)  # and up to the beginning of the current one
     here = np.empty(SUMS, np.float32)
     least = np.float32(1e-6) * before[count, 0]
-    low_run = 0
     place = 0
     depth = 0
     stack_size[0], stack_run[0] = len(leaf) - 1, count
@@ -174,7 +180,7 @@ def choose_nodes(
                 half = size >> 1
                 stack_size[depth] = half
                 depth += 1
-                run = sums_until(place + half, runs, low_run, high_run, before, block, leaf, stack, depth)
+                run = sums_until(place + half, runs, index, high_run, before, block, leaf, stack, depth)
                 stack_size[depth], stack_run[depth] = half, min(run + 1, high_run)
                 continue
             for i in range(SUMS):
@@ -185,7 +191,5 @@ def choose_nodes(
         place += size
         for i in range(SUMS):
             low[i] = stack[depth, i]
-        while low_run < high_run and int(runs[2 * low_run + 1]) < place:
-            low_run += 1
         depth -= 1
     return found

@@ -13,7 +13,7 @@ import numpy.typing as npt
 from studio_core.colour import LUMINANCE
 from studio_core.jit import kernel
 from studio_core.kernels.radiance import frame
-from studio_plugins.cuts.choose import MOST_NODES, NODE, SUMS, accumulate, choose_nodes
+from studio_plugins.cuts.choose import BLOCK, MOST_NODES, NODE, SUMS, accumulate, choose_nodes, index_runs
 from studio_plugins.cuts.intervals import ONES, U64, Pool, clear, hide, runs_of, set_bits
 
 F32 = npt.NDArray[np.float32]
@@ -64,6 +64,7 @@ def gather_light(
     words = np.empty(leaves >> 6, np.uint64)
     runs = np.empty(leaves + 2, pool.dtype)
     before = np.empty((leaves // 2 + 2, SUMS), np.float32)
+    index = np.empty(leaves // BLOCK + 1, np.int64)
     axes = np.empty((3, 3))
     made = np.empty((MOST_NODES, NODE), np.float32)
     everything = np.zeros(skip.shape[2], np.bool_)
@@ -87,10 +88,12 @@ def gather_light(
         found = 0
         if light > 0.0 and glossy[p]:
             frame(nx, ny, nz, axes)
+            index_runs(runs, count, index)
             allowed = np.float32(tolerance * max(light, floor))
             found = choose_nodes(
                 runs,
                 count,
+                index,
                 block,
                 leaf,
                 before,
@@ -198,6 +201,7 @@ def gather_difference(
     old, new = np.zeros(leaves >> 6, np.uint64), np.zeros(leaves >> 6, np.uint64)
     runs = np.empty(leaves + 2, pool.dtype)
     before = np.empty((leaves // 2 + 2, SUMS), np.float32)
+    index = np.empty(leaves // BLOCK + 1, np.int64)
     axes = np.empty((3, 3))
     made = np.empty((MOST_NODES, NODE), np.float32)
     everything = np.ones(skip.shape[2], np.bool_)
@@ -234,9 +238,11 @@ def gather_difference(
                     i = 5 + 4 * c
                     irradiance[p, c] += sign * (nx * total[i] + ny * total[i + 1] + nz * total[i + 2])
                 if glossy[p]:
+                    index_runs(runs, count, index)
                     found = choose_nodes(
                         runs,
                         count,
+                        index,
                         block,
                         leaf,
                         before,

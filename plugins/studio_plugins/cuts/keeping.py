@@ -9,19 +9,20 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from studio_core.shading.artifacts import Casters, Surfaces
+from studio_core.shading.artifacts import Surfaces
 from studio_core.shading.cache import DiskCache
-from studio_plugins.cuts.store import VisibilityStore, occluder_keys
+from studio_plugins.cuts.occluders import Occluders
+from studio_plugins.cuts.store import VisibilityStore
 
 METHOD = "cuts visibility, 1"
 I64 = npt.NDArray[np.int64]
 
 
-def key_of(k: int, surfaces: Surfaces, casters: Casters) -> tuple[object, ...]:
+def key_of(k: int, surfaces: Surfaces, occluders: Occluders) -> tuple[object, ...]:
     """What the visibility of the unrefined vertices depends on."""
     mesh = surfaces.unrefined.mesh
-    objects = zip(occluder_keys(surfaces, casters), mesh.objects, casters.transforms, strict=True)
-    return (k, *((key, placed.mesh.edge, len(placed.mesh), where) for key, placed, where in objects))
+    objects = tuple((placed.mesh.edge, len(placed.mesh), placed.transform) for placed in mesh.objects)
+    return (k, objects, occluders.keys, occluders.transforms)
 
 
 def unrefined_rows(surfaces: Surfaces) -> I64:
@@ -32,16 +33,16 @@ def unrefined_rows(surfaces: Surfaces) -> I64:
     return np.concatenate([*rows, np.zeros(0, np.int64)]).astype(np.int64)
 
 
-def load(cache: DiskCache, store: VisibilityStore, surfaces: Surfaces, casters: Casters) -> bool:
+def load(cache: DiskCache, store: VisibilityStore, surfaces: Surfaces, occluders: Occluders) -> bool:
     """Whether the store now knows what its unrefined vertices see."""
-    found = cache.get(METHOD, *key_of(store.k, surfaces, casters))
+    found = cache.get(METHOD, *key_of(store.k, surfaces, occluders))
     if found is None or not {"pool", "length"} <= found.keys():
         return False
     return store.unpack(unrefined_rows(surfaces), found["pool"], found["length"].astype(np.int32))
 
 
-def save(cache: DiskCache, store: VisibilityStore, surfaces: Surfaces, casters: Casters) -> int:
+def save(cache: DiskCache, store: VisibilityStore, surfaces: Surfaces, occluders: Occluders) -> int:
     """Keeps what the store knows of all unrefined vertices; bytes."""
     pool, length = store.packed(unrefined_rows(surfaces))
-    cache.put({"pool": pool, "length": length}, METHOD, *key_of(store.k, surfaces, casters))
+    cache.put({"pool": pool, "length": length}, METHOD, *key_of(store.k, surfaces, occluders))
     return pool.nbytes + length.nbytes

@@ -80,7 +80,7 @@ class LightCache:
         changed = points[~fresh]
         partly = sources.row[changed] > 0
         partly &= (self._stamp[changed] == sources.exact_stamp[changed]) & enough[~fresh]
-        partly &= (sources.exact_stamp[changed] > 0) & ~_mostly(sources, mesh, changed)
+        partly &= (sources.exact_stamp[changed] > 0) & ~_mostly(sources, changed)
         whole, rest = changed[~partly], changed[partly]
         if len(whole):
             self._sum(sources, mesh, whole, glossy, True, job)
@@ -108,7 +108,7 @@ class LightCache:
         found: dict[int, NodeBlock] = {}
         given = (
             mesh.normals,
-            mesh.object,
+            sources.owner,
             glossy,
             sources.pool,
             sources.start,
@@ -168,8 +168,8 @@ def starts(counts: I64) -> I64:
     return np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
 
 
-def _mostly(sources: Sources, mesh: WorldMesh, points: I64) -> Bools:
+def _mostly(sources: Sources, points: I64) -> Bools:
     """Points of whose record so much is out of date that a difference saves nothing."""
     stale = (sources.skip & ~sources.skip[:1]).sum(axis=2)
     many = stale > np.maximum(sources.skip.shape[1] // 2, 1)
-    return np.asarray(many[sources.row[points], mesh.object[points]])
+    return np.asarray(many[sources.row[points], sources.owner[points]])

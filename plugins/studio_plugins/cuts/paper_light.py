@@ -12,9 +12,9 @@ from studio_core.parallel import Workers
 from studio_core.shading.artifacts import Casters, Surfaces
 from studio_core.shading.job import Job
 from studio_plugins.cuts.nodes import NodeTable
+from studio_plugins.cuts.occluders import occluder_keys
 from studio_plugins.cuts.paper.path import PaperPath
 from studio_plugins.cuts.paper.settings import PaperParams
-from studio_plugins.cuts.store import occluder_keys
 
 I64 = npt.NDArray[np.int64]
 

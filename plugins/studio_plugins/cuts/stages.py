@@ -37,6 +37,7 @@ from studio_plugins.cuts.lamps import LampCache, Source, lamp_source, sphere
 from studio_plugins.cuts.light_cache import LightCache
 from studio_plugins.cuts.lobes import LobeTable
 from studio_plugins.cuts.nodes import NodeTable
+from studio_plugins.cuts.occluders import Occluders, OccluderTable
 from studio_plugins.cuts.paper.height_cuts import HIGHEST_K
 from studio_plugins.cuts.paper.settings import PaperParams
 from studio_plugins.cuts.paper_light import PaperLight
@@ -77,7 +78,8 @@ class VisibilityStage:
         self._cache: DiskCache | None = services.cache
         self._store: VisibilityStore | None = None
         self._preview = FIRST_LEVELS[-1]
-        self._asked: tuple[Surfaces, Casters] | None = None
+        self._occluders = OccluderTable()
+        self._asked: tuple[Surfaces, Occluders] | None = None
 
     def run(self, frame: Frame, inputs: Inputs, job: Job) -> Seen:
         """The previous where nobody sees anything else; publishes coarse steps of what is new."""
@@ -87,14 +89,15 @@ class VisibilityStage:
             self._store = VisibilityStore(k, self._workers)
         store = self._store
         generation = store.generation
-        store.follow(surfaces, inputs[Casters])
+        occluders = self._occluders(frame.scene, surfaces, inputs[Casters])
+        store.follow(surfaces, occluders)
         if frame.params.everywhere:
             mask = np.ones(len(surfaces.mesh.positions), np.bool_)
         else:
             mask = visible_vertices(surfaces, hits)
         points = np.flatnonzero(mask)
         before = store.stamp
-        self._asked = surfaces, inputs[Casters]
+        self._asked = surfaces, occluders
         if frame.params.method != EXACT:
             return self._unless_same(inputs.previous, Seen(store, points, mask, True, k), generation, before)
         if self._cache is not None and not frame.moving and store.stamp == 0:
@@ -133,13 +136,13 @@ class VisibilityStage:
         store = self._store
         if store is None or self._asked is None or frame.params.method != EXACT:
             return {}
-        surfaces, casters = self._asked
+        surfaces, occluders = self._asked
         rows = keeping.unrefined_rows(surfaces)
         missing = len(store.unknown(rows))
         if not missing:
             return {"vertices_traced": 0, "bytes": 0}
         store.trace(rows, job)
-        kept = keeping.save(self._cache, store, surfaces, casters) if self._cache is not None else 0
+        kept = keeping.save(self._cache, store, surfaces, occluders) if self._cache is not None else 0
         return {"vertices_traced": missing, "bytes": kept}
 
     def _look(self, points: I64, job: Job) -> None:

@@ -6,19 +6,21 @@ tell by stamps which vertices have another record than before.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from studio_core.parallel import Workers
+from studio_core.scene.nodes import NodeId
 from studio_core.scene.shading_mesh import ShadingMesh
-from studio_core.shading.artifacts import Casters, Surfaces
+from studio_core.shading.artifacts import Surfaces
 from studio_core.shading.job import Job
 from studio_plugins.cuts.beams import BeamTable, parts_of
 from studio_plugins.cuts.intervals import gather_records, relabel
+from studio_plugins.cuts.occluders import Occluders
 from studio_plugins.cuts.poses import Poses, stale
 from studio_plugins.cuts.records import NEVER, Records
 from studio_plugins.cuts.tracer import COUNTS, HORIZON, PACKETS, RAYS, SKIPPED, TRACED, trace_records
@@ -37,7 +39,8 @@ _NUMBERS_A_RECORD = {True: 4096, False: 256}  # room that is made at first
 class Sources:
     """Where the visibility of each vertex is to be read: an exact record and a coarse one.
 
-    The exact one counts but for the slots skip[row, object] (E, objects, slots), the coarse one wholly.
+    The exact one counts but for the slots skip[row, owner] (E, occluders, slots), the coarse one wholly;
+    owner (V,) is the occluder that a vertex belongs to.
     `stamp` (V,) tells when either was written (0: there is none), `exact_stamp` when the exact one was.
     Row 0 skips only what is gone: no coarse record is needed.
     """
@@ -49,6 +52,7 @@ class Sources:
     coarse_start: I64
     coarse_length: I32
     row: I32
+    owner: I32
     skip: Bools
     stamp: I64
     exact_stamp: I64
@@ -78,19 +82,20 @@ class VisibilityStore:
         self._alive: Bools = np.zeros(1, np.bool_)
         self._poses: dict[int, Poses] = {}
         self._now = 0
-        self._meshes: dict[int, tuple[ShadingMesh, slice]] = {}
+        self._meshes: dict[NodeId, tuple[ShadingMesh, slice]] = {}
         self._surfaces: Surfaces | None = None
-        self._casters: Casters | None = None
+        self._occluders: Occluders | None = None
+        self._owner: I32 = np.zeros(0, np.int32)
 
     # -- what is shaded ------------------------------------------------------------------------------
 
-    def follow(self, surfaces: Surfaces, casters: Casters) -> None:
+    def follow(self, surfaces: Surfaces, occluders: Occluders) -> None:
         """Turn to another state of the scene; what holds in it too is kept."""
-        if surfaces is self._surfaces and casters is self._casters:
+        if surfaces is self._surfaces and occluders is self._occluders:
             return
-        keys = zip(surfaces.nodes, occluder_keys(surfaces, casters), strict=True)
+        keys = occluders.keys
         slots = np.array([self._slot_of.setdefault(key, len(self._slot_of)) for key in keys], np.int64)
-        self._renumber(surfaces, slots)
+        self._renumber(surfaces)
         if not np.isin(self._slots, slots).all():  # what is gone hides nothing any more
             self.stamp += 1
             self.exact.stamp[self.exact.stamp > 0] = self.stamp
@@ -98,7 +103,7 @@ class VisibilityStore:
         self._slots = slots
         self._alive = np.zeros(max(len(self._slot_of), 1), np.bool_)
         self._alive[slots] = True
-        poses = Poses.of(casters.transforms, slots, len(self._alive))
+        poses = Poses.of(occluders.transforms, slots, len(self._alive))
         known = self._poses.get(self._now)
         if known is None or not poses.same(known, slots):
             self._now = max(self._poses, default=0) + 1
@@ -106,24 +111,24 @@ class VisibilityStore:
             self._forget_coarse()
         in_use = {int(epoch) for epoch in np.unique(self.exact.epoch)} | {self._now}
         self._poses = {epoch: kept for epoch, kept in self._poses.items() if epoch in in_use}
-        self._surfaces, self._casters = surfaces, casters
+        self._surfaces, self._occluders = surfaces, occluders
+        self._owner = occluders.of[surfaces.mesh.object]
 
-    def _renumber(self, surfaces: Surfaces, slots: I64) -> None:
+    def _renumber(self, surfaces: Surfaces) -> None:
         mesh = surfaces.mesh
         meshes = {
-            int(slot): (placed.mesh, mesh.vertices_of(index))
-            for index, (slot, placed) in enumerate(zip(slots, mesh.objects, strict=True))
+            placed.node: (placed.mesh, mesh.vertices_of(index)) for index, placed in enumerate(mesh.objects)
         }
         same = self._meshes.keys() == meshes.keys() and all(
-            self._meshes[slot][0] is shape and self._meshes[slot][1] == there
-            for slot, (shape, there) in meshes.items()
+            self._meshes[node][0] is shape and self._meshes[node][1] == there
+            for node, (shape, there) in meshes.items()
         )
         if same and len(self.exact) == len(mesh):
             return
         self.gone_to = np.full(len(self.exact), -1, np.int64)
-        for slot, (shape, there) in meshes.items():
-            if slot in self._meshes:
-                before, old = self._meshes[slot]
+        for node, (shape, there) in meshes.items():
+            if node in self._meshes:
+                before, old = self._meshes[node]
                 kept = _common(before, shape)
                 self.gone_to[old.start : old.start + kept] = np.arange(there.start, there.start + kept)
         self.generation += 1
@@ -154,13 +159,11 @@ class VisibilityStore:
 
     def unknown(self, points: Points) -> Points:
         """Those of the points whose exact record has to be traced, wholly or in part."""
-        assert self._surfaces is not None
         behind: Points = points[self.exact.epoch[points] != self._now]
         if not len(behind):
             return behind
         row, table = self._stale(behind)
-        object_of = self._surfaces.mesh.object[behind]
-        needed = np.asarray(table.any(axis=2))[row, object_of]
+        needed = np.asarray(table.any(axis=2))[row, self._owner[behind]]
         self.exact.epoch[behind[~needed]] = self._now
         made: Points = behind[needed]
         return made
@@ -184,6 +187,7 @@ class VisibilityStore:
             self._coarse.start,
             np.where(usable, self._coarse.length, 0).astype(np.int32),
             np.where(usable, self._coarse_row, 0).astype(np.int32),
+            self._owner,
             skip,
             np.where(usable, self._coarse.stamp, self.exact.stamp),
             self.exact.stamp,
@@ -272,11 +276,11 @@ class VisibilityStore:
         self, points: Points, row: I64, table: Bools, level: int, whole: bool, job: Job
     ) -> tuple[list[npt.NDArray[Any]], I32, Bools]:
         """Records (those that changed, one after the other), their lengths, and which changed."""
-        surfaces, casters = self._surfaces, self._casters
+        surfaces, occluders = self._surfaces, self._occluders
         assert surfaces is not None
-        assert casters is not None
+        assert occluders is not None
         mesh = surfaces.mesh
-        parts = parts_of(casters.shadow, mesh.origin)
+        parts = parts_of(occluders.caster, mesh.origin)
         beams, which = self._beams(level, parts.turn)
         exact = self.exact
         length, changed = np.zeros(len(points), np.int32), np.zeros(len(points), np.bool_)
@@ -300,7 +304,7 @@ class VisibilityStore:
                     mesh.normals,
                     mesh.geometric,
                     mesh.inset,
-                    mesh.object,
+                    self._owner,
                     self._slots,
                     exact.pool,
                     exact.start,
@@ -333,14 +337,8 @@ class VisibilityStore:
 
         self._workers.run(len(points), CHUNK, body, job)
         self.counts += sum(counts.values(), np.zeros(COUNTS, np.int64))
-        casters.shadow.count(int(sum(tally[RAYS] for tally in counts.values())))
+        occluders.caster.count(int(sum(tally[RAYS] for tally in counts.values())))
         return [piece for begin in sorted(found) for piece in found[begin]], length, changed
-
-
-def occluder_keys(surfaces: Surfaces, casters: Casters) -> list[object]:
-    """What makes an object another occluder: its mesh, and which of its faces stop light."""
-    opaque = [stops for _, stops in cast(Iterable[tuple[str, object]], casters.meshes)]
-    return [(source[1].key, stops) for source, stops in zip(surfaces.sources, opaque, strict=True)]
 
 
 def _common(before: ShadingMesh, after: ShadingMesh) -> int:
