@@ -51,11 +51,11 @@ class Setup:
 
 
 QUICK = Setup(
-    width=320,
-    height=180,
-    vertices=6000,
-    directions=1 << 12,
-    edits=4,
+    width=240,
+    height=135,
+    vertices=3000,
+    directions=1 << 11,
+    edits=3,
     checks=1,
     peer_edits=2,
     samples=(4, 16),
@@ -92,8 +92,10 @@ class Suite:
         self.services = self.services_in("shared")
         self.view = dataclasses.replace(scene_view(base, None, setup.width, setup.height), antialias=1)
         self.rooms = Rooms(base)
-        values = {"directions": str(setup.directions), "vertices": setup.vertices}
-        self.truth = Truth(program.registry.get("backend", "reference"), program.services, values)
+        values = {"directions": str(setup.directions), "vertices": setup.vertices, "quarters": False}
+        reference = program.registry.get("backend", "reference")
+        self.truth = Truth(reference, program.services, values)
+        self.finer = Truth(reference, program.services, {**values, "quarters": True})
         self._peers: dict[tuple[str, str], cuts_peers.Peer] = {}
         self.known = param_infos(self.backend.Params)
         self.methods = {p: m for p, m in METHODS.items() if not p or "method" in self.known}
@@ -110,6 +112,7 @@ class Suite:
                 for environment in ENVIRONMENTS:
                     for case in cases:
                         self._case(editor, case, environment, prefix, method)
+        self._equal_directions()
         for environment in ENVIRONMENTS:
             for name in cuts_keeping.SETTLES:
                 cuts_keeping.settle(self, environment, name)
@@ -202,6 +205,14 @@ class Suite:
             self.say(f"Reference: {len(states)} states of edit {place}")
             for state, everywhere in states:
                 self.truth(state, everywhere)
+
+    def _equal_directions(self) -> None:
+        """What is left to be wrong in a sum over all S directions, against the brightest in four parts."""
+        for environment in ENVIRONMENTS:
+            self.say(f"{prefix_of(environment)}all-directions")
+            state = self.base(environment, "diffuse")
+            pair = (self.truth(state), self.finer(state))
+            self.errors(f"{prefix_of(environment)}all-directions", [pair], False)
 
     def _case(self, editor: Editor, case: Case, environment: str, prefix: str, method: str) -> None:
         name = f"{prefix}{prefix_of(environment)}{case.name}"

@@ -393,6 +393,7 @@ def test_the_suite_has_every_promised_row(monkeypatch: pytest.MonkeyPatch, noisy
                 assert found[name, "picture_ms"] >= found[name, "compose_ms"] > 0
                 assert ("peer_picture_rel_rmse" in metrics) == (paper == "")
                 assert len(report.details[name]["ms"]) == TINY.edits
+        assert found[f"{sun}all-directions", "irradiance_rel_rmse"] < 0.01  # a smooth sky
         for case in SETTLES:
             assert found[f"{sun}{case}", "metered_picture_rel_rmse"] > 0
         assert found[f"{sun}settle", "picture_rel_rmse"] > 0
