@@ -96,7 +96,9 @@ class VisibilityStore:
         keys = occluders.keys
         slots = np.array([self._slot_of.setdefault(key, len(self._slot_of)) for key in keys], np.int64)
         self._renumber(surfaces)
-        if not np.isin(self._slots, slots).all():  # what is gone hides nothing any more
+        back = slots[slots < len(self._alive)]
+        same = np.isin(self._slots, slots).all() and self._alive[back].all()
+        if len(self._slots) and not same:  # what is gone hides nothing any more, what is back does again
             self.stamp += 1
             self.exact.stamp[self.exact.stamp > 0] = self.stamp
             self._forget_coarse()
