@@ -318,10 +318,11 @@ def test_converged_pictures_are_kept_by_content(noisy: type[Noisy]) -> None:
 
 @dataclasses.dataclass(frozen=True)
 class Params(ReferenceParams):
-    """What the reference does not have."""
+    """What the reference does not have; no direction is split, as in the truth."""
 
     method: str = param("exact", "Method", choices=("exact", "svc-vcf"))
     refine: bool = param(True, "Refine")
+    quarters: bool = param(False, "Split bright directions")
 
 
 class Twice:
