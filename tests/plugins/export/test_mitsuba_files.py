@@ -131,7 +131,9 @@ def test_the_camera_size_and_depth_are_parameters(room: Scene, host: PluginHost,
     MitsubaExporter(width=320, height=200, spp=7, max_depth=5).save(room, tmp_path, host)
     root = ElementTree.parse(tmp_path / "scene.xml").getroot()
     defaults = {d.get("name"): d.get("value") for d in root.findall("default")}
-    assert defaults == {"width": "320", "height": "200", "spp": "7", "max_depth": "5"}
+    known = {"width": "320", "height": "200", "spp": "7", "sampler": "independent", "max_depth": "5"}
+    assert defaults == known
+    assert {s.get("type") for s in root.iter("sampler")} == {"$sampler"}
 
 
 def test_textures_are_multiplied_with_their_parameter(host: PluginHost, parts: Any, tmp_path: Path) -> None:
