@@ -242,10 +242,8 @@ def parser() -> argparse.ArgumentParser:
     return made
 
 
-def _backend_options(verb: argparse.ArgumentParser, default: str = "cuts") -> None:
-    verb.add_argument(
-        "--backend", default=default, metavar="ID", help=f"how light is summed (default: {default})"
-    )
+def _backend_options(verb: argparse.ArgumentParser) -> None:
+    verb.add_argument("--backend", default="cuts", metavar="ID", help="how light is summed (default: cuts)")
     verb.add_argument(
         "--param",
         action="append",

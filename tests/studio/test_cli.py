@@ -464,7 +464,7 @@ def test_render_png_and_exr(files: Path, run: Run) -> None:
     assert said | {"counts": {}, "mean": 0, "vertices": 0, "shaded": 0} == {
         "project": "room.lucarne",
         "picture": "x.exr",
-        "backend": "reference",
+        "backend": "cuts",
         "width": 32,
         "height": 18,
         "vertices": 0,
