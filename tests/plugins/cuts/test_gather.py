@@ -248,13 +248,13 @@ def test_the_difference_leads_to_the_new_irradiance(seed, turned):
     bound = 1e-5 * float(known.irradiance.max())
     np.testing.assert_allclose(known.irradiance + found.irradiance, expected, atol=bound)
     for p in range(len(after)):
-        lit = np.zeros((S, 3))
-        for rows in (known.nodes[p], found.nodes[p]):
-            np.add.at(lit, DIRECTIONS.leaf_of(rows[:, :3].astype(np.float32)), rows[:, 3:])
-        new = np.zeros((S, 3))
-        np.add.at(new, DIRECTIONS.leaf_of(whole.nodes[p][:, :3].astype(np.float32)), whole.nodes[p][:, 3:])
-        # two neighbours of which one is nearly dark may be one node
-        np.testing.assert_allclose(lit, new, atol=20 * bound)
+        together = np.concatenate([known.nodes[p], found.nodes[p]])
+        for moment in (1, 2, 5):  # of the light, about all axes
+            both, new = (
+                np.einsum("nx,nc->xc", rows[:, :3] ** moment, rows[:, 3:])
+                for rows in (together, whole.nodes[p])
+            )
+            np.testing.assert_allclose(both, new, atol=10 * bound)
 
 
 def test_a_difference_with_tolerance_keeps_the_irradiance():
