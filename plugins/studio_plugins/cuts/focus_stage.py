@@ -79,7 +79,7 @@ class FocusStage:
                 self._state = state
             mine = alpha[mesh.material]
             stale = (self._version != base.version) | (mine < SHARPER * self._alpha)
-            stale &= seen.mask & (mine > 0)
+            stale &= seen.summed & (mine > 0)
             self._table.drop((self._version != base.version) | (mine <= 0))
             if stale.any():
                 weights = self._weights(frame.scene, inputs[Surfaces].materials)

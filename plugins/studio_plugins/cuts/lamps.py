@@ -122,6 +122,11 @@ class LampCache:
         self._state = np.zeros(0, np.int8)
         self._glossy = np.zeros(0, np.bool_)
 
+    @property
+    def settled(self) -> Bools:
+        """(V,) vertices that were looked at as finely as asked for."""
+        return np.asarray(self._state == _EXACT)
+
     def forget(self, points: Bools | slice = slice(None)) -> None:
         """These vertices have to be looked at again."""
         self._state[points] = _NOTHING

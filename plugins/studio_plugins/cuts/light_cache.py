@@ -44,6 +44,10 @@ class LightCache:
         """Sums of the light that is gathered."""
         return self._prefix
 
+    def settled(self, store: VisibilityStore) -> Bools:
+        """(V,) vertices whose irradiance is that of an exact record of what is now."""
+        return np.asarray((self._stamp > 0) & (self._stamp == store.exact.stamp) & store.current)
+
     def follow(self, store: VisibilityStore, tree: LightTree | None, tolerance: float) -> None:
         """Turn to the vertices of a store and this light; what was summed under another is forgotten."""
         if tree is not self._tree:

@@ -14,7 +14,9 @@ from studio_core.shading.artifacts import TERMS, Hits, LayerRadiance, Radiance, 
 from studio_core.shading.frame import Frame
 from studio_core.shading.job import Job
 from studio_core.shading.pipeline import Inputs
+from studio_plugins.cuts.fill import fill
 from studio_plugins.cuts.focus_stage import Focused
+from studio_plugins.cuts.nodes import NodeTable
 from studio_plugins.cuts.stages import Arriving, Seen
 
 F32 = npt.NDArray[np.float32]
@@ -57,6 +59,7 @@ class RadianceStage:
         other = np.append(changed, True)[mesh.material]
         if len(self._material) == count:
             other |= self._material != mesh.material
+        summed = seen.summed
         layers: dict[NodeId, LayerRadiance] = {}
         kept: dict[NodeId, _Layer] = {}
         looked = shaded = 0
@@ -65,23 +68,21 @@ class RadianceStage:
             tables = [table for pair in pairs for table in pair if table is not None]
             versions = [table.version.copy() for table in tables]
             if before is None or moved or len(before.version) != len(versions):
-                dirty = seen.mask
+                dirty = summed
                 terms = np.zeros((count, TERMS, 3), np.float32)
                 irradiance = np.zeros((count, 3), np.float32)
             else:
                 fresh = ~other
                 for was, is_ in zip(before.version, versions, strict=True):
                     fresh &= was == is_
-                dirty = seen.mask & ~fresh
-                if not dirty.any():
+                dirty = summed & ~fresh
+                if not dirty.any() and seen.between is None:
                     layers[node], kept[node] = before.radiance, before
                     continue
                 terms, irradiance = before.radiance.terms.copy(), before.radiance.irradiance.copy()
                 terms[dirty] = 0
             rows = np.flatnonzero(dirty)
-            irradiance[rows] = sum(
-                (nodes.irradiance[rows] for nodes, _ in pairs), np.zeros((len(rows), 3), np.float32)
-            )
+            irradiance[rows] = _irradiance(pairs, rows)
             for nodes, instead in pairs:
                 own = dirty if instead is None else dirty & ~instead.owned
                 looked += nodes.shade(mesh, shapes, local_eye, own, terms, self._workers, job)
@@ -92,19 +93,34 @@ class RadianceStage:
                 np.where(dirty, v, w)
                 for v, w in zip(versions, _or_blank(before, versions, moved), strict=True)
             ]
+            if seen.between is not None:
+                rest = seen.mask & ~summed
+                settled = arriving.settled.get(node, np.zeros(count, np.bool_))
+                rows = np.flatnonzero(rest & settled)
+                irradiance[rows] = _irradiance(pairs, rows)
+                fill(seen.between, rest, settled, terms, irradiance)
+                done = [np.where(rest, -1, version) for version in done]
             layers[node] = LayerRadiance(terms, irradiance)
             kept[node] = _Layer(layers[node], done)
         self._layers, self._eye, self._shapes, self._material = kept, eye, shape_table, mesh.material
         counts = {
             **seen.store.summary(),
             "vertices": count,
-            "skipped_vertices_unseen": count - len(seen.points),
+            "skipped_vertices_unseen": count - int(seen.mask.sum()),
+            "skipped_vertices_between": int(seen.mask.sum()) - len(seen.points),
             "vertices_shaded": shaded,
             "vertices_summed": arriving.summed,
             "vertices_traced_to_lamps": arriving.lamp_points,
             "nodes": looked,
         }
         return Radiance(surfaces, inputs[Hits], layers, seen.mask, 1 << seen.level, seen.exact, counts)
+
+
+def _irradiance(pairs: tuple[tuple[NodeTable, NodeTable | None], ...], rows: I64) -> F32:
+    made = np.zeros((len(rows), 3), np.float32)
+    for nodes, _ in pairs:
+        made += nodes.irradiance[rows]
+    return made
 
 
 def _or_blank(before: _Layer | None, versions: list[I64], moved: bool) -> list[I64]:

@@ -16,6 +16,7 @@ import numpy.typing as npt
 
 from studio_core.contract import Services
 from studio_core.kernels.light_tree import LightTree
+from studio_core.kernels.refinement import descend
 from studio_core.scene.diff import Aspect
 from studio_core.scene.nodes import NodeId
 from studio_core.scene.transform import Transform
@@ -28,6 +29,7 @@ from studio_core.shading.artifacts import (
 )
 from studio_core.shading.cache import DiskCache
 from studio_core.shading.frame import Frame
+from studio_core.shading.interpolation import parents
 from studio_core.shading.job import Job
 from studio_core.shading.pipeline import Inputs
 from studio_core.shading.primary import visible_vertices
@@ -51,19 +53,32 @@ Bools = npt.NDArray[np.bool_]
 EXACT, PAPER = "exact", "svc-vcf"
 FIRST_LEVELS = (10, 12)
 """Fineness of the first pictures of a scene of which nothing is known."""
-SLOW, QUICK = 0.07, 0.015
-"""Seconds of a preview after which the next is coarser, or finer."""
+COARSEST, FINEST = 10, 13
+SLOW, QUICK = 0.06, 0.03
+"""Fineness of previews, and seconds of one after which the next is coarser, or finer."""
 
 
 @dataclass(frozen=True, eq=False)
 class Seen:
-    """Which vertices are to be lit, and the store of what they see, at one moment."""
+    """Which vertices are to be lit, and the store of what they see, at one moment.
+
+    mask (V,) marks all that the picture needs, points those that light is summed at: while somebody moves
+    something, refined vertices take theirs from the two they lie between, given by `between` (V, 2).
+    """
 
     store: VisibilityStore
     points: I64
     mask: Bools
     exact: bool
     level: int
+    between: I64 | None = None
+
+    @property
+    def summed(self) -> Bools:
+        """(V,) the points as a mask."""
+        made = np.zeros(len(self.mask), np.bool_)
+        made[self.points] = True
+        return made
 
 
 class VisibilityStage:
@@ -77,7 +92,7 @@ class VisibilityStage:
         self._workers = services.workers
         self._cache: DiskCache | None = services.cache
         self._store: VisibilityStore | None = None
-        self._preview = FIRST_LEVELS[-1]
+        self._preview = FINEST - 1
         self._occluders = OccluderTable()
         self._asked: tuple[Surfaces, Occluders] | None = None
 
@@ -102,7 +117,12 @@ class VisibilityStage:
             return self._unless_same(inputs.previous, Seen(store, points, mask, True, k), generation, before)
         if self._cache is not None and not frame.moving and store.stamp == 0:
             keeping.load(self._cache, store, *self._asked)
+        between = None
         if frame.moving:
+            if surfaces.base is not None:
+                between, core = parents(surfaces.mesh), mask.copy()
+                descend(between, core)
+                points = np.flatnonzero(core)
             self._look(points, job)
         else:
             unknown = store.unknown(points)
@@ -113,7 +133,8 @@ class VisibilityStage:
                         job.publish(Seen(store, points, mask, False, level))
             store.trace(points, job)
         exact = not len(store.unknown(points))
-        made = Seen(store, points, mask, exact, k if exact else self._preview)
+        exact = exact and between is None
+        made = Seen(store, points, mask, exact, k if exact else self._preview, between)
         return self._unless_same(inputs.previous, made, generation, before)
 
     def _unless_same(self, previous: Seen | None, made: Seen, generation: int, before: int) -> Seen:
@@ -124,6 +145,7 @@ class VisibilityStage:
             and made.store.stamp == before
             and previous.store is made.store
             and previous.exact == made.exact
+            and (previous.between is None) == (made.between is None)
             and np.array_equal(previous.mask, made.mask)
         )
         return previous if same and previous is not None else made
@@ -151,22 +173,24 @@ class VisibilityStage:
         self._store.preview(points, self._preview, job)
         taken = time.perf_counter() - started
         if taken > SLOW:
-            self._preview = max(self._preview - 1, FIRST_LEVELS[0])
+            self._preview = max(self._preview - 1, COARSEST)
         elif taken < QUICK:
-            self._preview = min(self._preview + 1, FIRST_LEVELS[-1])
+            self._preview = min(self._preview + 1, FINEST)
 
 
 @dataclass(frozen=True, eq=False)
 class Arriving:
     """The light of every layer at the vertices: tables of nodes, which change in place.
 
-    `environment` is the table of what exact records see, made from `prefix` sums.
+    `environment` is the table of what exact records see, made from `prefix` sums; `settled` tells of each
+    layer at which vertices (V,) its irradiance is that of now, also where it was not asked for.
     """
 
     layers: tuple[tuple[NodeId, tuple[NodeTable, ...]], ...]
     newest: tuple[int, ...]
     environment: NodeTable | None
     prefix: Prefix | None
+    settled: Mapping[NodeId, Bools]
     summed: int
     lamp_points: int
 
@@ -233,7 +257,11 @@ class LightStage:
             return previous
         there = lighting.environment is not None and exact
         environment = self._environment.table if there else None
-        return Arriving(layers, newest, environment, self._environment.prefix, summed, looked)
+        settled = {node: self._lamps[node].settled for node in self._lamps}
+        if lighting.environment is not None and exact:
+            node, own = lighting.environment.id, self._environment.settled(seen.store)
+            settled[node] = own & settled[node] if node in settled else own
+        return Arriving(layers, newest, environment, self._environment.prefix, settled, summed, looked)
 
     def _tables(self, lighting: Lighting, exact: bool) -> list[tuple[NodeId, tuple[NodeTable, ...]]]:
         made: list[tuple[NodeId, tuple[NodeTable, ...]]] = []

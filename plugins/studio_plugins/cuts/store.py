@@ -198,7 +198,12 @@ class VisibilityStore:
     @property
     def known(self) -> int:
         """How many vertices have an exact record of what is now."""
-        return int((self.exact.epoch == self._now).sum())
+        return int(self.current.sum())
+
+    @property
+    def current(self) -> Bools:
+        """(V,) which vertices have an exact record of what is now."""
+        return np.asarray(self.exact.epoch == self._now)
 
     def summary(self) -> Mapping[str, int]:
         """Counts of work done and skipped since the store was made."""
