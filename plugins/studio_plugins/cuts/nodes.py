@@ -110,7 +110,7 @@ class NodeTable:
         for name in ("irradiance", "version", "_owner"):
             getattr(made, name)[to[kept]] = getattr(self, name)[kept]
         made.blocks = {
-            number: dataclasses.replace(block, points=to[block.points])
+            number: dataclasses.replace(block, points=np.where(block.points < 0, -1, to[block.points]))
             for number, block in self.blocks.items()
         }
         return made
