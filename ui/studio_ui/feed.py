@@ -1,7 +1,7 @@
 """From changes of document and session to pictures: what to ask the scheduler for, and how finely.
 
-While somebody drags or looks around, pictures are small and unsmoothed and a new one is asked for as soon as
-the last one was seen; at rest one full, smoothed picture follows. No Qt here.
+While somebody drags or looks around, pictures are unsmoothed, as small as they must be to come quickly, and a
+new one is asked for as soon as the last one was seen; at rest one full, smoothed picture follows. No Qt here.
 """
 
 from __future__ import annotations
@@ -23,10 +23,10 @@ from studio_core.shading.job import Job
 from studio_core.shading.pipeline import Pipeline
 from studio_core.shading.scheduler import Executor, Scheduler
 from studio_core.signal import Signal
+from studio_ui.pace import Pace
 
 REST_MS = 260
 REST_PIXELS, REST_SAMPLES = 2_400_000, 4_500_000
-MOVING_PIXELS = 260_000
 
 
 class Freshness(Enum):
@@ -129,6 +129,7 @@ class PictureFeed:
         executor: Executor,
         post: Callable[[Callable[[], None]], None],
         later: Callable[[int, Callable[[], None]], object],
+        clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self.shown: Signal[[Shown]] = Signal()
         self.freshness: Signal[[Freshness]] = Signal()
@@ -139,7 +140,8 @@ class PictureFeed:
         self.last: Shown | None = None
         self.size = (session.view.width, session.view.height)
         self._document, self._session, self._shading = document, session, shading
-        self._executor, self._post, self._later = executor, post, later
+        self._executor, self._post, self._later, self._clock = executor, post, later, clock
+        self.pace = Pace()
         self._moving = 0  # gestures under way
         self._until = 0.0  # single steps (wheel, keys) count as moving until then
         self._changes = Changes()
@@ -165,7 +167,7 @@ class PictureFeed:
     @property
     def moving(self) -> bool:
         """Whether somebody drags or looks around."""
-        return self._moving > 0 or time.monotonic() < self._until
+        return self._moving > 0 or self._clock() < self._until
 
     def resized(self, width: int, height: int) -> None:
         """The canvas has other pixels."""
@@ -186,7 +188,7 @@ class PictureFeed:
 
     def step(self) -> None:
         """A single step of looking around (wheel, key, resize)."""
-        self._until = time.monotonic() + REST_MS / 1000
+        self._until = self._clock() + REST_MS / 1000
         self._later(REST_MS + 20, self._rest)
 
     def forget(self) -> None:
@@ -220,7 +222,7 @@ class PictureFeed:
     def frame_view(self, moving: bool) -> View:
         """The session's view in the pixels and samples that are right while moving, or at rest."""
         width, height = self.size
-        limit = MOVING_PIXELS if moving else REST_PIXELS
+        limit = self.pace.pixels if moving else REST_PIXELS
         shrink = min(1.0, (limit / (width * height)) ** 0.5)
         view = self._session.view.sized(round(width * shrink), round(height * shrink))
         smooth = not moving and view.width * view.height * 4 <= REST_SAMPLES
@@ -279,7 +281,7 @@ class PictureFeed:
         quick = self.moving or self.last is None
         view = self.frame_view(quick)
         frame = Frame(self._document.scene, view, self._session.params, moving=self.moving)
-        asked, finer_only, self._finer_only = time.monotonic(), self._finer_only, True
+        asked, finer_only, self._finer_only = self._clock(), self._finer_only, True
         revision = self._revision = self._revision + 1  # as the scheduler counts
         self._asked[revision] = asked
         self._outdated = self._outdated if finer_only else revision
@@ -306,9 +308,13 @@ class PictureFeed:
 
     def _show(self, frame: Frame, picture: Picture, final: bool) -> None:
         self._answered = True
-        asked = self._asked.get(frame.revision, time.monotonic())
+        asked = self._asked.get(frame.revision, self._clock())
         self._asked = {r: t for r, t in self._asked.items() if r >= frame.revision}
-        self.last = Shown(picture, frame.view, final, time.monotonic() - asked, frame.moving)
+        self.last = Shown(picture, frame.view, final, self._clock() - asked, frame.moving)
+        if frame.moving and final:
+            self.pace.took(self.last.seconds)
+        elif not frame.moving:
+            self.pace.rest()
         self.shown.emit(self.last)
         self.measured.emit(None)
         if frame.revision < self._outdated or (self._changes and not self._finer_only):
