@@ -17,13 +17,24 @@ from studio_core.parallel import Workers
 from studio_core.scene.nodes import NodeId
 from studio_core.scene.shading_mesh import ShadingMesh
 from studio_core.shading.artifacts import Surfaces
+from studio_core.shading.interpolation import parents
 from studio_core.shading.job import Job
 from studio_plugins.cuts.beams import BeamTable, parts_of
+from studio_plugins.cuts.guides import packets_around
 from studio_plugins.cuts.intervals import gather_records, relabel
 from studio_plugins.cuts.occluders import Occluders
 from studio_plugins.cuts.poses import Poses, stale
 from studio_plugins.cuts.records import NEVER, Records
-from studio_plugins.cuts.tracer import COUNTS, HORIZON, PACKETS, RAYS, SKIPPED, TRACED, trace_records
+from studio_plugins.cuts.tracer import (
+    COUNTS,
+    GUESSED,
+    HORIZON,
+    PACKETS,
+    RAYS,
+    SKIPPED,
+    TRACED,
+    trace_records,
+)
 
 I32 = npt.NDArray[np.int32]
 I64 = npt.NDArray[np.int64]
@@ -213,6 +224,7 @@ class VisibilityStore:
             "skipped_objects_below_horizon": HORIZON,
             "packets": PACKETS,
             "skipped_packets": SKIPPED,
+            "skipped_packets_as_neighbours": GUESSED,
         }
         return {name: int(self.counts[column]) for name, column in names.items()}
 
@@ -279,6 +291,16 @@ class VisibilityStore:
         self._coarse_row[todo] = np.where(changed, len(self._coarse_stale) + 1 + row, 0)
         self._coarse_stale.extend(table)
 
+    def _guides(self, points: Points) -> I64:
+        """(P, 2) vertices with records of what is now that refinement put each point between, or -1."""
+        made = np.full((len(points), 2), -1, np.int64)
+        if self._surfaces is None or self._surfaces.base is None:
+            return made
+        between = parents(self._surfaces.mesh)[points]
+        known = self.current[between].all(axis=1) & (between[:, 0] != between[:, 1])
+        made[known] = between[known]
+        return made
+
     def _run(
         self, points: Points, row: I64, table: Bools, level: int, whole: bool, job: Job
     ) -> tuple[list[npt.NDArray[Any]], I32, Bools]:
@@ -289,7 +311,7 @@ class VisibilityStore:
         mesh = surfaces.mesh
         parts = parts_of(occluders.caster, mesh.origin)
         beams, which = self._beams(level, parts.turn)
-        exact = self.exact
+        exact, guides = self.exact, self._guides(points)
         length, changed = np.zeros(len(points), np.int32), np.zeros(len(points), np.bool_)
         found: dict[int, list[npt.NDArray[Any]]] = {}
         counts: dict[int, I64] = {}
@@ -329,6 +351,8 @@ class VisibilityStore:
                     beams.sine,
                     beams.offset,
                     self.k - level,
+                    guides,
+                    packets_around(self.k),
                     len(self._alive),
                     whole,
                     out,

@@ -2,7 +2,8 @@
 
 A vertex asks only the objects that are stale for it. Whole cones of leaves are skipped where the object
 cannot be: outside the frustum of its bounding box, below the horizon or behind the vertex' own object,
-where nothing is seen anyway. What is left is traced against that object alone, in its own frame.
+where nothing is seen anyway, or where the vertices around agree. What is left is traced against that
+object alone, in its own frame.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ import numpy.typing as npt
 
 from studio_core.jit import call_address, kernel
 from studio_core.kernels.packets import DIRECTION, MASK, OPAQUE, ORIGIN, TFAR, new_packet
+from studio_plugins.cuts.guides import guess, index_record, segment_bits
 from studio_plugins.cuts.intervals import ONES, U64, Pool, runs_of, set_bits
 
 F32 = npt.NDArray[np.float32]
@@ -20,12 +22,14 @@ I32 = npt.NDArray[np.int32]
 I64 = npt.NDArray[np.int64]
 Bools = npt.NDArray[np.bool_]
 
-COUNTS = 5
-RAYS, HORIZON, SKIPPED, PACKETS, TRACED = range(COUNTS)
+COUNTS = 6
+RAYS, HORIZON, SKIPPED, PACKETS, TRACED, GUESSED = range(COUNTS)
 """Columns of counts: rays; objects skipped under the horizon; packets of 8 skipped by its frustum, or
-since the vertex' own object or the horizon hides them; packets looked at; objects looked at."""
+since the vertex' own object or the horizon hides them; packets looked at; objects looked at; packets taken
+from the vertices around."""
 
 _NONE = np.uint64(0)
+_BYTE = np.uint64(0xFF)
 
 
 @kernel
@@ -85,12 +89,16 @@ def _blocked(
     sine: F32,
     offset: I64,
     hidden: U64,
+    guided: bool,
+    guessed: U64,
+    sure: U64,
     words: U64,
     counts: I64,
 ) -> int:
     """Sets the bits of the leaves that one object blocks; how many packets block something.
 
-    (x, y, z) is the ray origin in the object's frame; `hidden` has bits where no ray is needed.
+    (x, y, z) is the ray origin in the object's frame; `hidden` has bits where no ray is needed. If guided,
+    one ray decides whether a packet that is `sure` is as `guessed`; then its bits are set in `hidden`.
     """
     words[:] = _NONE
     sides = frustum(x, y, z, half, planes)
@@ -128,6 +136,10 @@ def _blocked(
             counts[SKIPPED] += size >> 3
             leaf += size
         elif size > 8:
+            if guided and size == 64 and sure[leaf >> 6] != _NONE:
+                found += _checked(
+                    occluded8, scene, packet, valid, leaf >> 6, rows, hidden, guessed, sure, words, counts
+                )
             size >>= 3
             level += 1
             continue
@@ -158,6 +170,53 @@ def _blocked(
         while size < largest and leaf % (size << 3) == 0:
             size <<= 3
             level -= 1
+    return found
+
+
+@kernel
+def _checked(
+    occluded8: int,
+    scene: int,
+    packet: F32,
+    valid: I32,
+    word: int,
+    rows: F32,
+    hidden: U64,
+    guessed: U64,
+    sure: U64,
+    words: U64,
+    counts: I64,
+) -> int:
+    """Takes the guess for those packets of a word of which one ray says that it is right; how many block."""
+    used = 0
+    for part in range(8):
+        shift = np.uint64(8 * part)
+        row = 8 * word + part
+        lane = (5 * row + 3) & 7
+        there = (sure[word] >> shift) & _BYTE == _BYTE and (hidden[word] >> shift) & _BYTE != _BYTE
+        valid[part] = -1 if there else 0
+        used += there
+        packet[DIRECTION, part] = rows[row, 0, lane]
+        packet[DIRECTION + 1, part] = rows[row, 1, lane]
+        packet[DIRECTION + 2, part] = rows[row, 2, lane]
+        packet[TFAR, part] = np.inf
+    if used == 0:
+        return 0
+    counts[RAYS] += used
+    counts[PACKETS] += 1
+    call_address(occluded8, valid, scene, packet, 0)
+    found = 0
+    for part in range(8):
+        if valid[part] == 0:
+            continue
+        shift = np.uint64(8 * part)
+        blocked = (guessed[word] >> shift) & _BYTE != _NONE
+        if (packet[TFAR, part] < 0) == blocked:
+            counts[GUESSED] += 1
+            if blocked:
+                words[word] |= (_BYTE << shift) & ~hidden[word]
+                found += 1
+            hidden[word] |= _BYTE << shift
     return found
 
 
@@ -219,6 +278,8 @@ def trace_records(
     sine: F32,
     offset: I64,
     shift: int,
+    guides: I64,
+    around: I32,
     slot_count: int,
     whole: bool,
     out: Pool,
@@ -234,6 +295,8 @@ def trace_records(
     stale[stale_row[p], r, j] says that what object r's vertices know of object j must be traced again; the
     rest is copied from the old record pool[start:start + length] when the record is to be `whole`, or left
     out. One ray stands for 2^shift leaves.
+    guides (P, 2) are vertices with records of what is now between which a point lies, or -1: where they agree
+    (see `guess`) a point without a record takes it from them.
     `changed` marks points whose record differs (without one, all); `counts` (COUNTS,) is added to.
     """
     packets = rows.shape[1]
@@ -244,6 +307,10 @@ def trace_records(
     hidden = np.empty(groups, np.uint64)
     words = np.empty(groups, np.uint64)
     where = np.full(slot_count, -1, np.int64)
+    where_a, where_b = np.full(slot_count, -1, np.int64), np.full(slot_count, -1, np.int64)
+    one, other = np.empty(groups, np.uint64), np.empty(groups, np.uint64)
+    scratch, sure = np.empty(groups, np.uint64), np.empty(groups, np.uint64)
+    skipped = np.empty(groups, np.uint64)
     planes = np.empty((6, 3))
     room = (8 * packets << shift) + 4
     place = 0
@@ -256,6 +323,10 @@ def trace_records(
         while at < end:
             where[pool[at]] = at
             at += 2 + 2 * int(pool[at + 1])
+        guided = guides[number, 0] >= 0 and length[p] == 0 and shift == 0
+        if guided:
+            index_record(pool, start[guides[number, 0]], length[guides[number, 0]], where_a)
+            index_record(pool, start[guides[number, 1]], length[guides[number, 1]], where_b)
         first = place
         differs = length[p] == 0
         full = False
@@ -309,6 +380,11 @@ def trace_records(
                     counts[HORIZON] += 1
                 else:
                     w = which[j]
+                    if guided:
+                        segment_bits(pool, where_a[slot], one)
+                        segment_bits(pool, where_b[slot], other)
+                        guess(one, other, around, scratch, sure)
+                        skipped[:] = hidden
                     found = _blocked(
                         occluded8,
                         scene[j],
@@ -323,7 +399,10 @@ def trace_records(
                         axis[w],
                         sine,
                         offset,
-                        hidden,
+                        skipped if guided else hidden,
+                        guided,
+                        one,
+                        sure,
                         words,
                         counts,
                     )
@@ -345,6 +424,9 @@ def trace_records(
         while at < end:
             where[pool[at]] = -1
             at += 2 + 2 * int(pool[at + 1])
+        if guided:
+            where_a[:] = -1
+            where_b[:] = -1
         if full:
             used[0] = first
             return number - begin
