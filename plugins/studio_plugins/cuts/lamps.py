@@ -118,6 +118,7 @@ class LampCache:
         self.table = NodeTable(0)
         self._workers = workers
         self._generation = 0
+        self._store: VisibilityStore | None = None
         self._source: Source | None = None
         self._state = np.zeros(0, np.int8)
         self._glossy = np.zeros(0, np.bool_)
@@ -133,18 +134,18 @@ class LampCache:
 
     def follow(self, source: Source, store: VisibilityStore) -> None:
         """Turn to this light and to the vertices of a store."""
-        if store.generation != self._generation:
+        if store is not self._store or store.generation != self._generation:
             count = len(store.exact.start)
             state, glossy = self._state, self._glossy
             self._state, self._glossy = np.zeros(count, np.int8), np.zeros(count, np.bool_)
-            if store.generation == self._generation + 1:
+            if store is self._store and store.generation == self._generation + 1:
                 kept = np.flatnonzero(store.gone_to >= 0)
                 to = store.gone_to[kept]
                 self._state[to], self._glossy[to] = state[kept], glossy[kept]
                 self.table = self.table.renumbered(count, store.gone_to)
             else:
                 self.table = self.table.resized(count)
-            self._generation = store.generation
+            self._store, self._generation = store, store.generation
         if self._source is None or not _equal(self._source, source):
             self.forget()
         self._source = source
@@ -210,14 +211,27 @@ class LampCache:
 
 
 def shadowed(positions: F64, source: Source, centre: F64, radius: float) -> Bools:
-    """(P,) whether a sphere may stand between positions (P, 3) and a light."""
+    """(P,) whether a sphere may stand between positions (P, 3) and a light.
+
+    All rays to the light lie in balls of radius t·spread about position + t·way, 0 ≤ t ≤ 1 (t ≥ 0 for a
+    direction). One of them meets the sphere where |position + t·way − centre| ≤ radius + t·spread, squared:
+    a·t² − 2b·t + c ≤ 0.
+    """
     middle, spread, place = source.middle
-    way = middle - positions if place else np.broadcast_to(middle / np.linalg.norm(middle), positions.shape)
-    length2 = np.maximum((way * way).sum(axis=1), 1e-30)
-    along = ((centre - positions) * way).sum(axis=1) / length2
-    along = np.clip(along, 0.0, 1.0) if place else np.maximum(along, 0.0)
-    gap = np.linalg.norm(positions + along[:, None] * way - centre, axis=1)
-    return np.asarray(gap <= radius + along * spread + 1e-6 * (1 + radius))
+    radius += 1e-6 * (1 + radius)
+    way = middle - positions if place else np.broadcast_to(middle, positions.shape)
+    off = centre - positions
+    a = (way * way).sum(axis=1) - spread**2
+    b = (off * way).sum(axis=1) + radius * spread
+    c = (off * off).sum(axis=1) - radius**2
+    lowest = np.maximum(b / np.where(a > 0, a, 1.0), 0.0)
+    if place:
+        ends = np.minimum(c, a - 2 * b + c)
+        lowest = np.minimum(lowest, 1.0)
+    else:
+        ends = np.where(a > 0, c, -1.0)  # lights all around: anything may be in the way
+    inside = a * lowest**2 - 2 * b * lowest + c
+    return np.asarray(np.where(a > 0, np.minimum(inside, ends), ends) <= 0)
 
 
 def lamp_source(lamp: Lamp, samples: int) -> Source:
