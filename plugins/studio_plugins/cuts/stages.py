@@ -233,7 +233,7 @@ class LightStage:
         shadows = self._moved(surfaces, inputs[Casters])
         sources = self._sources(lighting, frame, wanted)
         self._lamps = {node: self._lamps.get(node) or LampCache(self._workers) for node in sources}
-        for node, (source, coarse) in sources.items():
+        for node, (source, _) in sources.items():
             cache = self._lamps[node]
             cache.follow(source, seen.store)
             for index, spheres in shadows:
@@ -241,7 +241,8 @@ class LightStage:
                     cache.forget(mesh.vertices_of(index))
                 for middle, radius in spheres:
                     cache.forget(cache.shadowed_by(mesh.positions + mesh.origin, middle, radius))
-            looked += cache.gather(
+        for node, (_, coarse) in sources.items():  # once all know what moved: this may be cancelled
+            looked += self._lamps[node].gather(
                 mesh,
                 inputs[Casters].shadow,
                 seen.points,
