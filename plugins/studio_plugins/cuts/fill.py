@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from studio_core.kernels.refinement import prolong
+from studio_core.jit import kernel
 
 F32 = npt.NDArray[np.float32]
 I64 = npt.NDArray[np.int64]
@@ -19,12 +19,30 @@ Bools = npt.NDArray[np.bool_]
 _DARK = np.float32(1e-12)
 
 
-def fill(between: I64, wanted: Bools, settled: Bools, terms: F32, irradiance: F32) -> None:
-    """Sets terms (V, T, 3) and, but for the settled, irradiance (V, 3) of wanted vertices from `between`."""
-    unknown = wanted & ~settled
-    if unknown.any():
-        prolong(between, ~unknown, irradiance)
-    whole = np.maximum(irradiance, _DARK)[:, None]
-    share = np.asarray(terms / whole, np.float32).reshape(len(terms), -1)
-    prolong(between, ~wanted, share)
-    terms[wanted] = share.reshape(terms.shape)[wanted] * irradiance[wanted][:, None]
+def fill(between: I64, summed: Bools, wanted: Bools, settled: Bools, terms: F32, irradiance: F32) -> None:
+    """Sets terms (V, T, 3) and, but for the settled, irradiance (V, 3) of wanted vertices.
+
+    `between` (V, 2) are summed or wanted vertices of lower number; those that are `summed` give theirs.
+    """
+    count = len(terms)
+    share = np.empty((count, terms[0].size if count else 0), np.float32)
+    _fill(between, summed, wanted, settled, terms.reshape(count, -1), irradiance, share)
+
+
+@kernel
+def _fill(
+    between: I64, summed: Bools, wanted: Bools, settled: Bools, terms: F32, irradiance: F32, share: F32
+) -> None:
+    half = np.float32(0.5)
+    for i in range(len(between)):
+        if summed[i]:
+            for c in range(terms.shape[1]):
+                share[i, c] = terms[i, c] / max(irradiance[i, c % 3], _DARK)
+        elif wanted[i]:
+            one, other = between[i, 0], between[i, 1]
+            if not settled[i]:
+                for c in range(3):
+                    irradiance[i, c] = half * (irradiance[one, c] + irradiance[other, c])
+            for c in range(terms.shape[1]):
+                share[i, c] = half * (share[one, c] + share[other, c])
+                terms[i, c] = share[i, c] * irradiance[i, c % 3]

@@ -30,6 +30,7 @@ Bools = npt.NDArray[np.bool_]
 
 BROADEST = 1.5  # slope of lobes for which nodes do as they are
 SHARPER = 0.85  # a lobe narrower than this share of the one that nodes were split for needs them split again
+MOVING = 2.5  # times as much is allowed while somebody looks around
 _ROOM = 512
 
 
@@ -71,7 +72,11 @@ class FocusStage:
             alpha = np.array([*slopes, 0.0], np.float32)
             wanted = quality(frame.params.quality)
             eye = tuple(frame.view.transform.translation)
-            state = (eye, wanted.lobe, seen.store, seen.store.generation, prefix)
+            tolerance = wanted.lobe
+            if frame.moving:  # what was split finely for the same eye stays
+                kept = self._state[:2] == (eye, wanted.lobe)
+                tolerance *= 1 if kept else MOVING
+            state = (eye, tolerance, seen.store, seen.store.generation, prefix)
             count = len(mesh.positions)
             if state != self._state or count != len(self._table):
                 self._table = self._table.resized(count)
@@ -84,7 +89,7 @@ class FocusStage:
             if stale.any():
                 weights = self._weights(frame.scene, inputs[Surfaces].materials)
                 local_eye = (np.asarray(eye, np.float64) - mesh.origin).astype(np.float32)
-                self._split(base, prefix, inputs, stale, local_eye, alpha, weights, wanted.lobe, job)
+                self._split(base, prefix, inputs, stale, local_eye, alpha, weights, tolerance, job)
                 self._version[stale], self._alpha[stale] = base.version[stale], mine[stale]
         layers = []
         for node, tables in arriving.layers:

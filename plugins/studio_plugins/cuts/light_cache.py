@@ -35,6 +35,7 @@ class LightCache:
         self._tree: LightTree | None = None
         self._tolerance = 0.0
         self._generation = 0
+        self._store: VisibilityStore | None = None
         self._prefix: Prefix | None = None
         self._stamp = np.zeros(0, np.int64)
         self._glossy = np.zeros(0, np.bool_)
@@ -58,17 +59,17 @@ class LightCache:
             self._stamp[:] = 0
         self._tolerance = tolerance
         count = len(store.exact)
-        if store.generation != self._generation or tree is None:
+        if store is not self._store or store.generation != self._generation or tree is None:
             stamp, glossy = self._stamp, self._glossy
             self._stamp, self._glossy = np.zeros(count, np.int64), np.zeros(count, np.bool_)
-            if store.generation == self._generation + 1 and tree is not None:
+            if store is self._store and store.generation == self._generation + 1 and tree is not None:
                 kept = np.flatnonzero(store.gone_to >= 0)
                 to = store.gone_to[kept]
                 self._stamp[to], self._glossy[to] = stamp[kept], glossy[kept]
                 self.table = self.table.renumbered(count, store.gone_to)
             else:
                 self.table = self.table.resized(count)
-            self._generation = store.generation
+            self._store, self._generation = store, store.generation
             self.difference = self.difference.resized(count)
 
     def gather(self, store: VisibilityStore, mesh: WorldMesh, points: I64, glossy: Bools, job: Job) -> int:

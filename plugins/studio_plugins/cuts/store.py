@@ -41,7 +41,7 @@ I64 = npt.NDArray[np.int64]
 Bools = npt.NDArray[np.bool_]
 Points = I64
 
-CHUNK = 32
+CHUNK = {True: 32, False: 160}  # of whole records, and of coarse ones
 BATCH = 4096
 _NUMBERS_A_RECORD = {True: 4096, False: 256}  # room that is made at first
 
@@ -366,7 +366,7 @@ class VisibilityStore:
                 size = size if done else 2 * size
             found[begin], counts[begin] = mine, tally
 
-        self._workers.run(len(points), CHUNK, body, job)
+        self._workers.run(len(points), CHUNK[whole], body, job)
         self.counts += sum(counts.values(), np.zeros(COUNTS, np.int64))
         occluders.caster.count(int(sum(tally[RAYS] for tally in counts.values())))
         return [piece for begin in sorted(found) for piece in found[begin]], length, changed
