@@ -90,7 +90,10 @@ def see(scene: Scene, view: View) -> Picture:
         material = scene.material(node.materials[0])
         linear[hit] = material.values.get("base_color", (0.5, 0.5, 0.5))
     radiance: Any = SimpleNamespace(
-        surfaces=SimpleNamespace(nodes=tuple(n.id for n in nodes)), valid=np.ones(8, bool), directions=1024
+        surfaces=SimpleNamespace(nodes=tuple(n.id for n in nodes)),
+        valid=np.ones(8, bool),
+        directions=1024,
+        counts={"rays": 12345, "skipped_packets": 678},
     )
     covered = (index >= 0).astype(np.float32)
     return Picture(radiance, linear, covered, index, nearest.astype(np.float32))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +14,7 @@ from pytestqt.qtbot import QtBot
 from ui_support import Answers, Driver, Fake, Make, room
 
 from studio.app import assemble
+from studio_core.contract import Plugin
 from studio_core.registry import PluginHost
 from studio_core.shading.scheduler import InlineExecutor
 from studio_plugins.brdfs import plugin as brdfs
@@ -26,13 +27,19 @@ def make(qtbot: QtBot, tmp_path: Path) -> Iterator[Make]:
     """Open windows: `make(threads=True)` computes on real threads, otherwise inline."""
     made: list[Driver] = []
 
-    def build(*, threads: bool = False, state: Path | None = None, answers: Answers | None = None) -> Driver:
+    def build(
+        *,
+        threads: bool = False,
+        state: Path | None = None,
+        answers: Answers | None = None,
+        plugins: Sequence[Plugin] = (brdfs, meshes),
+    ) -> Driver:
         fake, answers = Fake(), answers or Answers()
         settings = Settings(state or tmp_path / "state")
         given: dict[str, Any] = {} if threads else {"compute": InlineExecutor(), "files": InlineExecutor()}
         studio = assemble(
             settings=settings,
-            host=PluginHost([brdfs, meshes]),
+            host=PluginHost(plugins),
             shading=fake,
             ask=answers,
             threads=1,

@@ -36,6 +36,7 @@ from studio_ui.panels.panel import Panel, stacked
 from studio_ui.panels.properties import PropertiesPanel
 from studio_ui.panels.shading import ShadingPanel
 from studio_ui.project_files import PROJECTS, SUFFIX, ProjectFiles
+from studio_ui.quality import QualityControl
 from studio_ui.settings import Settings
 from studio_ui.status import StatusBar
 from studio_ui.theme import DARK, THEMES, Theme, wear
@@ -68,6 +69,8 @@ class MainWindow(QMainWindow):
         self.files = ProjectFiles(context, self.ask, settings, files_executor)
         self.transfer = Transfer(context, self.ask, lambda: self.commands.frame_all())
         self.status = StatusBar()
+        self.quality = QualityControl(context, width=64)
+        self.status.addPermanentWidget(self.quality)
         self.tools = CanvasTools(
             viewport, context.document, context.session, context.editing, context.feed, self.status.say
         )
@@ -395,5 +398,6 @@ class MainWindow(QMainWindow):
         self._subscriptions.close()
         self.view_controls.close_panel()
         self.hints.close_panel()
+        self.quality.close_panel()
         for panel in self.panels.values():
             panel.close_panel()

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QFormLayout, QLabel, QWidget
+from PySide6.QtWidgets import QFormLayout, QLabel, QToolButton, QWidget
 
 from studio_core.params import ParamInfo
 from studio_ui.fields import FIELDS, Field, tip
@@ -17,22 +17,66 @@ _LABEL = 92  # pixels
 
 
 class ParamForm(QWidget):
-    """A row for every parameter; `show_values` follows the scene without telling the sink."""
+    """A row for every parameter; `show_values` follows the scene without telling the sink.
 
-    def __init__(self, infos: Mapping[str, ParamInfo], sink: Sink, skip: tuple[str, ...] = ()) -> None:
+    Advanced ones are below the others, folded up behind `more` until it is pressed.
+    """
+
+    def __init__(
+        self,
+        infos: Mapping[str, ParamInfo],
+        sink: Sink,
+        skip: tuple[str, ...] = (),
+        *,
+        unfolded: bool = False,
+    ) -> None:
         super().__init__()
         self.fields: dict[str, Field] = {}
+        self.more: QToolButton | None = None
         layout = form_layout(self)
-        for name, info in infos.items():
-            if name not in skip:
-                self.fields[name] = field = FIELDS[info.kind](name, info, sink)
-                layout.addRow(form_label(info.label, tip(info)), field)
+        shown = {name: info for name, info in infos.items() if name not in skip}
+        for name, info in shown.items():
+            if not info.advanced:
+                self._add(layout, name, info, sink)
+        folded = {name: info for name, info in shown.items() if info.advanced}
+        if folded:
+            inside = QWidget()
+            rows = form_layout(inside)
+            for name, info in folded.items():
+                self._add(rows, name, info, sink)
+            self.more = _fold(inside, unfolded)
+            layout.addRow(self.more)
+            layout.addRow(inside)
+
+    def _add(self, layout: QFormLayout, name: str, info: ParamInfo, sink: Sink) -> None:
+        self.fields[name] = field = FIELDS[info.kind](name, info, sink)
+        layout.addRow(form_label(info.label, tip(info)), field)
 
     def show_values(self, values: Mapping[str, Any]) -> None:
         """What the scene has now; names without a field are left alone."""
         for name, value in values.items():
             if name in self.fields:
                 self.fields[name].show_value(value)
+
+
+def _fold(inside: QWidget, unfolded: bool) -> QToolButton:
+    """A button that shows and hides `inside`."""
+    button = QToolButton()
+    button.setText("More")
+    button.setToolTip("What seldom needs to be changed")
+    button.setCheckable(True)
+    button.setAutoRaise(True)
+    button.setProperty("role", "fold")
+    button.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextBesideIcon)
+
+    def turn(open_: bool) -> None:
+        button.setArrowType(Qt.ArrowType.DownArrow if open_ else Qt.ArrowType.RightArrow)
+        inside.setVisible(open_)
+
+    button.toggled.connect(turn)
+    button.setChecked(unfolded)
+    turn(unfolded)
+    return button
 
 
 def form_layout(parent: QWidget) -> QFormLayout:

@@ -16,6 +16,23 @@ from studio_ui.journal import Entry
 
 _SHOWN_MS = 9000
 _ERROR = "Relative error of the picture against brute force, measured at random places while nothing moves"
+_VERTICES = "Points that were lit, of all shading vertices"
+_DIRECTIONS = "Directions that light came from"
+_TIME = "From the change to this picture"
+_COUNTS = {
+    "vertices": "shading vertices",
+    "vertices_shaded": "shaded anew for this picture",
+    "vertices_summed": "whose light was summed anew",
+    "vertices_traced_to_lamps": "that looked anew at lamps and the sun",
+    "skipped_vertices_unseen": "skipped, as the view does not show them",
+    "nodes": "light nodes looked at",
+    "rays": "rays, since the scene was opened",
+    "packets": "packets of rays",
+    "skipped_packets": "packets skipped, as nothing stands in their way",
+    "objects_traced": "objects tried as occluders of a point",
+    "skipped_objects_below_horizon": "objects skipped below a point's horizon",
+}
+"""What is told of `Radiance.counts`; others are told by their names."""
 
 
 class StatusBar(QStatusBar):
@@ -33,9 +50,9 @@ class StatusBar(QStatusBar):
         self.time = QLabel()
         self.error = QLabel("error: not measured")
         self.error.setToolTip(_ERROR)
-        self.vertices.setToolTip("Points that were lit, of all shading vertices")
-        self.directions.setToolTip("Directions that light came from")
-        self.time.setToolTip("From the change to this picture")
+        self.vertices.setToolTip(_VERTICES)
+        self.directions.setToolTip(_DIRECTIONS)
+        self.time.setToolTip(_TIME)
         self.pixel.setToolTip("What is under the mouse: radiance (scene-linear red, green, blue)")
         self.addWidget(self.message, 1)
         for label in (self.pixel, self.backend, self.vertices, self.directions, self.time, self.error):
@@ -68,10 +85,13 @@ class StatusBar(QStatusBar):
         self.vertices.setText(f"{lit:,} of {count:,} vertices" if lit != count else f"{count:,} vertices")
         self.directions.setText(f"{radiance.directions:,} directions")
         self.time.setText(duration(shown.seconds))
+        counts = counted(radiance.counts)
+        self.vertices.setToolTip("\n".join([_VERTICES, *counts]))
+        self.directions.setToolTip("\n".join([_DIRECTIONS, *counts]))
 
     def show_freshness(self, state: Freshness) -> None:
         """How the picture stands to the scene."""
-        self.time.setToolTip(f"From the change to this picture ({state.value})")
+        self.time.setToolTip(f"{_TIME} ({state.value})")
 
     def show_error(self, error: MeasuredError | None, names: Mapping[str, str]) -> None:
         """How wrong the picture is; its layers by the lights' names in the tooltip."""
@@ -81,7 +101,9 @@ class StatusBar(QStatusBar):
             return
         self.error.setText(f"error: {error.picture}")
         lines = [_ERROR, f"of the lit points alone: {error.vertices}"]
-        lines += [f"{names.get(layer, layer)}: {part}" for layer, part in error.layers.items()]
+        if error.picture.p99:
+            lines.append(f"one place in a hundred is off by more than {100 * error.picture.p99:.1f} %")
+        lines += [f"by {names.get(layer, layer)} alone: {part}" for layer, part in error.layers.items()]
         self.error.setToolTip("\n".join(lines))
 
     def show_probe(self, probe: Probe | None, scene: Scene) -> None:
@@ -94,6 +116,13 @@ class StatusBar(QStatusBar):
         name = node.name if node is not None else "background"
         place = f", {probe.distance:.2f} m" if math.isfinite(probe.distance) else ""
         self.pixel.setText(f"{name}{place}: {red:.3g} {green:.3g} {blue:.3g}")
+
+
+def counted(counts: Mapping[str, int]) -> list[str]:
+    """Lines for a tooltip: what was done for a picture, and what was skipped."""
+    known = [f"{counts[name]:,} {text}" for name, text in _COUNTS.items() if name in counts]
+    others = [f"{n:,} {name.replace('_', ' ')}" for name, n in counts.items() if name not in _COUNTS]
+    return known + others
 
 
 def duration(seconds: float) -> str:

@@ -79,6 +79,7 @@ QToolButton { border: 1px solid transparent; border-radius: 4px; padding: 4px; }
 QToolButton:hover { background: $raised; }
 QToolButton:pressed, QToolButton:checked { background: $accent; color: $on_accent; }
 QToolButton::menu-indicator { image: none; }
+QToolButton[role="fold"]:checked { background: transparent; color: $text; }
 QDockWidget { color: $dim; font-weight: 600; }
 QDockWidget::title { background: $window; padding: 6px 8px; border-bottom: 1px solid $border; }
 QTabBar { qproperty-drawBase: 0; }

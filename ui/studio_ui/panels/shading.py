@@ -11,9 +11,10 @@ from studio_core.contract import ShadingBackend
 from studio_core.errors import PluginError
 from studio_core.params import Value, defaults, param_infos
 from studio_ui.context import Context
-from studio_ui.fields import Combo
+from studio_ui.fields import Combo, tip
 from studio_ui.panels.panel import Panel, clear, note
 from studio_ui.param_form import ParamForm, form_label, form_layout
+from studio_ui.quality import NAME, QualityControl, offers_quality
 from studio_ui.sinks import PlainSink
 
 
@@ -27,6 +28,7 @@ class ShadingPanel(Panel):
         super().__init__(context)
         self.form: ParamForm | None = None
         self.combo = Combo()
+        self.quality: QualityControl | None = None
         self._column = self.scroller()
         self.subscriptions.add(
             context.warmed.connect(self.refresh), context.session.changed.connect(self._told)
@@ -35,6 +37,8 @@ class ShadingPanel(Panel):
 
     def refresh(self) -> None:
         """Build the form of the session's backend."""
+        unfolded = self.form is not None and self.form.more is not None and self.form.more.isChecked()
+        self._close_quality()
         clear(self._column)
         self.form = None
         self.combo = Combo()
@@ -51,13 +55,30 @@ class ShadingPanel(Panel):
         self._column.addWidget(box)
         backend = self._backend(session.backend)
         if backend is not None:
-            self.form = ParamForm(param_infos(backend.Params), PlainSink(self._set))
+            infos = param_infos(backend.Params)
+            skip: tuple[str, ...] = ()
+            if offers_quality(infos):
+                skip, self.quality = (NAME,), QualityControl(self.context)
+                line = QWidget()
+                form_layout(line).addRow(form_label(infos[NAME].label, tip(infos[NAME])), self.quality)
+                self._column.addWidget(line)
+            self.form = ParamForm(infos, PlainSink(self._set), skip, unfolded=unfolded)
             self._column.addWidget(self.form)
             self.form.show_values(self._values(backend, session.params))
         elif not self.context.warm:
             self._column.addWidget(note("Loading…"))
         self._column.addStretch(1)
         self._shown = session.backend
+
+    def close_panel(self) -> None:
+        """Stop listening."""
+        super().close_panel()
+        self._close_quality()
+
+    def _close_quality(self) -> None:
+        if self.quality is not None:
+            self.quality.close_panel()
+            self.quality = None
 
     def _backend(self, name: str) -> ShadingBackend | None:
         if not self.context.warm:
