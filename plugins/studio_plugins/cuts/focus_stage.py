@@ -59,6 +59,7 @@ class FocusStage:
         self._table = NodeTable(0)
         self._version: I64 = np.zeros(0, np.int64)
         self._alpha: F32 = np.zeros(0, np.float32)
+        self._positions: F32 = np.zeros((0, 3), np.float32)
         self._state: tuple[object, ...] = ()
 
     def run(self, frame: Frame, inputs: Inputs, job: Job) -> Focused:
@@ -82,6 +83,9 @@ class FocusStage:
                 self._table = self._table.resized(count)
                 self._version, self._alpha = np.full(count, -1, np.int64), np.zeros(count, np.float32)
                 self._state = state
+            else:
+                self._version[(self._positions != mesh.positions).any(axis=1)] = -1
+            self._positions = mesh.positions
             mine = alpha[mesh.material]
             stale = (self._version != base.version) | (mine < SHARPER * self._alpha)
             stale &= seen.summed & (mine > 0)
@@ -114,6 +118,7 @@ class FocusStage:
         job: Job,
     ) -> None:
         mesh, shapes = inputs[Surfaces].mesh, inputs[Shapes]
+        runs = inputs[Arriving].runs
         numbered = [(number, block) for number, block in base.numbered() if block.detail is not None]
         found: dict[int, list[NodeBlock]] = {}
 
@@ -136,8 +141,9 @@ class FocusStage:
                     block.data,
                     detail.spread,
                     detail.cell,
-                    detail.run_first,
-                    detail.runs,
+                    runs.pool,
+                    runs.start,
+                    runs.length,
                     base.owner,
                     stale,
                     mesh.positions,

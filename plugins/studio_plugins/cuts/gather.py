@@ -50,6 +50,9 @@ def gather_light(
     out: F32,
     nodes: I64,
     detail: F32,
+    known: Pool,
+    known_start: I64,
+    known_length: I32,
     out_runs: Pool,
     run_count: I64,
 ) -> int:
@@ -57,8 +60,9 @@ def gather_light(
 
     A surface that is not glossy gets one node, whose direction nobody looks at. `nodes` (P,) counts them.
     The tolerance is a share of the point's luminous irradiance, and at least of `floor`. Records as in
-    `Sources`. `detail` gets spread and cell of every node, `out_runs` the runs of points with nodes, of which
-    `run_count` (P,) says how many. Returns how many points fitted.
+    `Sources`. `detail` gets spread and cell of every node, `out_runs` the first and last leaves of all that
+    each point sees, of which `run_count` (P,) says how many pairs; where known_length (V,) is not negative
+    they are `known` already, and not written. Returns how many points fitted.
     """
     leaves = len(leaf) - 1
     words = np.empty(leaves >> 6, np.uint64)
@@ -74,10 +78,19 @@ def gather_light(
             return number - begin
         p = points[number]
         nx, ny, nz = normals[p, 0], normals[p, 1], normals[p, 2]
-        words[:] = ONES if length[p] + coarse_length[p] > 0 else np.uint64(0)
-        hide(pool, start[p], length[p], skip[row[p], object_of[p]], words)
-        hide(coarse_pool, coarse_start[p], coarse_length[p], everything, words)
-        count = runs_of(words, len(words), 0, runs, 0) // 2
+        if known_length[p] >= 0:
+            count = known_length[p] // 2
+            for i in range(2 * count):
+                runs[i] = known[known_start[p] + i]
+        else:
+            words[:] = ONES if length[p] + coarse_length[p] > 0 else np.uint64(0)
+            hide(pool, start[p], length[p], skip[row[p], object_of[p]], words)
+            hide(coarse_pool, coarse_start[p], coarse_length[p], everything, words)
+            count = runs_of(words, len(words), 0, runs, 0) // 2
+            run_count[number] = count
+            for i in range(2 * count):
+                out_runs[kept + i] = runs[i]
+            kept += 2 * count
         accumulate(runs, count, block, leaf, before)
         total = before[count]
         red = max(nx * total[5] + ny * total[6] + nz * total[7], np.float32(0))
@@ -115,13 +128,9 @@ def gather_light(
         for line in range(6):
             for node in range(found):
                 out[6 * place + line * found + node] = made[node, line]
-        run_count[number] = count if glossy[p] and found else 0
         for node in range(found):
             detail[2 * (place + node)] = made[node, 6]
             detail[2 * (place + node) + 1] = made[node, 7]
-        if glossy[p]:
-            out_runs[kept : kept + 2 * run_count[number]] = runs[: 2 * run_count[number]]
-            kept += 2 * run_count[number]
         place += found
     return stop - begin
 

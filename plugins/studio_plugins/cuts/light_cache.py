@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import numpy.typing as npt
 
@@ -12,12 +14,14 @@ from studio_core.shading.job import Job
 from studio_plugins.cuts.choose import MOST_NODES, Prefix
 from studio_plugins.cuts.gather import gather_difference, gather_light
 from studio_plugins.cuts.nodes import FLOATS, Detail, NodeBlock, NodeTable
+from studio_plugins.cuts.records import Records
 from studio_plugins.cuts.store import Sources, VisibilityStore
 
 I64 = npt.NDArray[np.int64]
 Bools = npt.NDArray[np.bool_]
 
 CHUNK = 128
+MOVING = 2.5  # times as much is allowed of a node while a hand turns the light
 _FLOOR = 0.02  # of the irradiance of an open place: darker ones need no finer nodes
 _ROOM, _RUNS = 384, 1024  # nodes and run ends a point that room is made for at first
 
@@ -25,7 +29,8 @@ _ROOM, _RUNS = 384, 1024  # nodes and run ends a point that room is made for at 
 class LightCache:
     """Sums the light of one environment over the records of a store; owned by the compute thread.
 
-    `table` holds what exact records see; `difference` what coarse ones add to it or take away.
+    `table` holds what exact records see; `difference` what coarse ones add to it or take away; `runs` the
+    first and last leaves of all that vertices see, for the next light.
     """
 
     def __init__(self, workers: Workers) -> None:
@@ -39,11 +44,19 @@ class LightCache:
         self._prefix: Prefix | None = None
         self._stamp = np.zeros(0, np.int64)
         self._glossy = np.zeros(0, np.bool_)
+        self.runs = Records(15, 0)
+        self._run_stamp = np.zeros(0, np.int64)
 
     @property
     def prefix(self) -> Prefix | None:
         """Sums of the light that is gathered."""
         return self._prefix
+
+    def tolerance_for(self, tree: LightTree, wanted: float, moving: bool) -> float:
+        """What to ask for: more is allowed under a light that turns, and what was finer stays."""
+        if not moving:
+            return wanted
+        return max(self._tolerance, wanted) if tree is self._tree else MOVING * wanted
 
     def settled(self, store: VisibilityStore) -> Bools:
         """(V,) vertices whose irradiance is that of an exact record of what is now."""
@@ -60,15 +73,19 @@ class LightCache:
         self._tolerance = tolerance
         count = len(store.exact)
         if store is not self._store or store.generation != self._generation or tree is None:
-            stamp, glossy = self._stamp, self._glossy
+            stamp, glossy, run_stamp = self._stamp, self._glossy, self._run_stamp
             self._stamp, self._glossy = np.zeros(count, np.int64), np.zeros(count, np.bool_)
+            self._run_stamp = np.zeros(count, np.int64)
             if store is self._store and store.generation == self._generation + 1 and tree is not None:
                 kept = np.flatnonzero(store.gone_to >= 0)
                 to = store.gone_to[kept]
                 self._stamp[to], self._glossy[to] = stamp[kept], glossy[kept]
+                self._run_stamp[to] = run_stamp[kept]
                 self.table = self.table.renumbered(count, store.gone_to)
+                self.runs.renumber(count, store.gone_to)
             else:
                 self.table = self.table.resized(count)
+                self.runs = Records(store.k, count)
             self._store, self._generation = store, store.generation
             self.difference = self.difference.resized(count)
 
@@ -135,7 +152,7 @@ class LightCache:
                 out = np.empty(FLOATS * room, np.float32)
                 if whole:
                     detail = np.empty(2 * room, np.float32)
-                    runs = np.empty((2 << store_k) + _RUNS * (stop - begin), sources.pool.dtype)
+                    runs = np.empty((2 << self.runs.k) + _RUNS * (stop - begin), self.runs.pool.dtype)
                     done = gather_light(
                         begin,
                         stop,
@@ -145,6 +162,9 @@ class LightCache:
                         out,
                         counts,
                         detail,
+                        self.runs.pool,
+                        self.runs.start,
+                        known,
                         runs,
                         run_counts,
                     )
@@ -157,15 +177,22 @@ class LightCache:
                 more = None
                 if whole:
                     own = detail[: 2 * int(first[-1])].reshape(-1, 2)
-                    run_first = starts(run_counts[begin : begin + done])
-                    kept = runs[: 2 * int(run_first[-1])].copy()
-                    more = Detail(own[:, 0].copy(), own[:, 1].astype(np.int32), run_first, kept)
+                    more = Detail(own[:, 0].copy(), own[:, 1].astype(np.int32))
+                    seen[begin] = runs[: 2 * int(run_counts[begin : begin + done].sum())].copy()
                 found[begin] = NodeBlock(points[begin : begin + done], first, data, more)
                 begin += done
 
-        store_k = len(prefix.leaf).bit_length() - 1
+        known = np.where(self._run_stamp == sources.stamp, self.runs.length, -1).astype(np.int32)
+        known[sources.stamp == 0] = -1
+        seen: dict[int, npt.NDArray[Any]] = {}
         self._workers.run(len(points), CHUNK, body, job)
         table.replace([found[begin] for begin in sorted(found)])
+        fresh = known[points] < 0
+        if whole and fresh.any():
+            length = (2 * run_counts[fresh]).astype(np.int32)
+            self.runs.write(points[fresh], [seen[begin] for begin in sorted(seen)], length, 1)
+            self.runs.tidy()
+            self._run_stamp[points[fresh]] = sources.stamp[points[fresh]]
 
 
 def starts(counts: I64) -> I64:

@@ -10,7 +10,6 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -35,18 +34,16 @@ class Detail:
     """What splitting the nodes of a block further needs.
 
     spread (N,) mean square angle of each node's light about its direction; cell (N,) the node of the tree of
-    directions it stands for; run_first (P + 1,) and runs: first and last leaf of all that each point sees.
+    directions it stands for.
     """
 
     spread: F32
     cell: I32
-    run_first: I64
-    runs: npt.NDArray[Any]
 
     @property
     def nbytes(self) -> int:
         """Bytes of all arrays."""
-        return self.spread.nbytes + self.cell.nbytes + self.run_first.nbytes + self.runs.nbytes
+        return self.spread.nbytes + self.cell.nbytes
 
 
 @dataclass(frozen=True)

@@ -44,6 +44,7 @@ from studio_plugins.cuts.paper.height_cuts import HIGHEST_K
 from studio_plugins.cuts.paper.settings import PaperParams
 from studio_plugins.cuts.paper_light import PaperLight
 from studio_plugins.cuts.quality import Quality, quality
+from studio_plugins.cuts.records import Records
 from studio_plugins.cuts.store import VisibilityStore
 
 F32 = npt.NDArray[np.float32]
@@ -182,14 +183,15 @@ class VisibilityStage:
 class Arriving:
     """The light of every layer at the vertices: tables of nodes, which change in place.
 
-    `environment` is the table of what exact records see, made from `prefix` sums; `settled` tells of each
-    layer at which vertices (V,) its irradiance is that of now, also where it was not asked for.
+    `environment` is the table of what exact records see, made from `prefix` sums over `runs`; `settled` tells
+    of each layer at which vertices (V,) its irradiance is that of now, also where it was not asked for.
     """
 
     layers: tuple[tuple[NodeId, tuple[NodeTable, ...]], ...]
     newest: tuple[int, ...]
     environment: NodeTable | None
     prefix: Prefix | None
+    runs: Records
     settled: Mapping[NodeId, Bools]
     summed: int
     lamp_points: int
@@ -228,7 +230,8 @@ class LightStage:
                 tree = tree.coarsened(k)
                 summed = self._paper.gather(surfaces, inputs[Casters], tree, seen.points, paper, job)
             else:
-                self._environment.follow(seen.store, tree, wanted.tolerance)
+                tolerance = self._environment.tolerance_for(tree, wanted.tolerance, frame.moving)
+                self._environment.follow(seen.store, tree, tolerance)
                 summed = self._environment.gather(seen.store, mesh, seen.points, glossy, job)
         shadows = self._moved(surfaces, inputs[Casters])
         sources = self._sources(lighting, frame, wanted)
@@ -262,7 +265,8 @@ class LightStage:
         if lighting.environment is not None and exact:
             node, own = lighting.environment.id, self._environment.settled(seen.store)
             settled[node] = own & settled[node] if node in settled else own
-        return Arriving(layers, newest, environment, self._environment.prefix, settled, summed, looked)
+        kept = self._environment
+        return Arriving(layers, newest, environment, kept.prefix, kept.runs, settled, summed, looked)
 
     def _tables(self, lighting: Lighting, exact: bool) -> list[tuple[NodeId, tuple[NodeTable, ...]]]:
         made: list[tuple[NodeId, tuple[NodeTable, ...]]] = []
