@@ -36,6 +36,7 @@ class LightCache:
     def __init__(self, workers: Workers) -> None:
         self.table = NodeTable(0)
         self.difference = NodeTable(0)
+        self._differs = False
         self._workers = workers
         self._tree: LightTree | None = None
         self._tolerance = 0.0
@@ -105,11 +106,13 @@ class LightCache:
         partly &= (sources.exact_stamp[changed] > 0) & ~_mostly(sources, changed)
         whole, rest = changed[~partly], changed[partly]
         if len(whole):
+            self._stamp[whole] = 0  # cancelled half way, nothing holds any more
             self._sum(sources, mesh, whole, glossy, True, job)
             self._stamp[whole] = sources.stamp[whole]
             self._glossy[whole] = glossy[whole]
-        if len(rest) or self.difference.blocks:
+        if len(rest) or self._differs:
             self.difference = self.difference.resized(len(self.table))
+        self._differs = len(rest) > 0
         if len(rest):
             self._sum(sources, mesh, rest, glossy, False, job)
         return len(changed)

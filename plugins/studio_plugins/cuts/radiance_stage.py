@@ -45,6 +45,8 @@ class RadianceStage:
         self._eye: tuple[float, ...] = ()
         self._shapes: list[tuple[int, bytes]] = []
         self._material: npt.NDArray[np.int32] = np.zeros(0, np.int32)
+        self._positions: F32 = np.zeros((0, 3), np.float32)
+        self._numbers: tuple[object, ...] = ()
 
     def run(self, frame: Frame, inputs: Inputs, job: Job) -> Radiance:
         """Radiance of all layers; vertices that are not seen have none."""
@@ -53,12 +55,14 @@ class RadianceStage:
         count = len(mesh.positions)
         eye = tuple(frame.view.transform.translation)
         local_eye = (np.asarray(eye, np.float64) - mesh.origin).astype(np.float32)
-        moved = eye != self._eye or len(self._material) != count
+        numbers = (seen.store, seen.store.generation)
+        moved = eye != self._eye or numbers != self._numbers
         shape_table = _shape_table(shapes)
         changed = _changed_materials(self._shapes, shape_table)
         other = np.append(changed, True)[mesh.material]
-        if len(self._material) == count:
+        if numbers == self._numbers:  # who moves sees the eye elsewhere
             other |= self._material != mesh.material
+            other |= (self._positions != mesh.positions).any(axis=1)
         summed = seen.summed
         layers: dict[NodeId, LayerRadiance] = {}
         kept: dict[NodeId, _Layer] = {}
@@ -77,7 +81,8 @@ class RadianceStage:
                     fresh &= was == is_
                 dirty = summed & ~fresh
                 if not dirty.any() and seen.between is None:
-                    layers[node], kept[node] = before.radiance, before
+                    done = [np.where(other, -1, version) for version in before.version]
+                    layers[node], kept[node] = before.radiance, _Layer(before.radiance, done)
                     continue
                 terms, irradiance = before.radiance.terms.copy(), before.radiance.irradiance.copy()
                 terms[dirty] = 0
@@ -90,7 +95,7 @@ class RadianceStage:
                     looked += instead.shade(mesh, shapes, local_eye, dirty, terms, self._workers, job)
             shaded += len(rows)
             done = [
-                np.where(dirty, v, w)
+                np.where(dirty, v, np.where(other, -1, w))
                 for v, w in zip(versions, _or_blank(before, versions, moved), strict=True)
             ]
             if seen.between is not None:
@@ -103,14 +108,15 @@ class RadianceStage:
             layers[node] = LayerRadiance(terms, irradiance)
             kept[node] = _Layer(layers[node], done)
         self._layers, self._eye, self._shapes, self._material = kept, eye, shape_table, mesh.material
+        self._positions, self._numbers = mesh.positions, numbers
         counts = {
             **seen.store.summary(),
             "vertices": count,
             "skipped_vertices_unseen": count - int(seen.mask.sum()),
             "skipped_vertices_between": int(seen.mask.sum()) - len(seen.points),
             "vertices_shaded": shaded,
-            "vertices_summed": arriving.summed,
-            "vertices_traced_to_lamps": arriving.lamp_points,
+            "vertices_summed": arriving.summed if Arriving in inputs.rebuilt else 0,
+            "vertices_traced_to_lamps": arriving.lamp_points if Arriving in inputs.rebuilt else 0,
             "nodes": looked,
         }
         return Radiance(surfaces, inputs[Hits], layers, seen.mask, 1 << seen.level, seen.exact, counts)

@@ -328,7 +328,7 @@ def trace_records(
             index_record(pool, start[guides[number, 0]], length[guides[number, 0]], where_a)
             index_record(pool, start[guides[number, 1]], length[guides[number, 1]], where_b)
         first = place
-        differs = length[p] == 0
+        differs = length[p] == 0 or stale[stale_row[number], r, r]  # light arrives at another slant
         full = False
         nx, ny, nz = normals[p, 0], normals[p, 1], normals[p, 2]
         ox = float(positions[p, 0]) + epsilon * geometric[p, 0] + inset[p, 0]
