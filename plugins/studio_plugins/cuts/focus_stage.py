@@ -30,6 +30,7 @@ Bools = npt.NDArray[np.bool_]
 
 BROADEST = 1.5  # slope of lobes for which nodes do as they are
 SHARPER = 0.85  # a lobe narrower than this share of the one that nodes were split for needs them split again
+AHEAD = 0.7  # of the width of a lobe is split for while it changes
 MOVING = 2.5  # times as much is allowed while somebody looks around
 _ROOM = 512
 
@@ -93,8 +94,9 @@ class FocusStage:
             if stale.any():
                 weights = self._weights(frame.scene, inputs[Surfaces].materials)
                 local_eye = (np.asarray(eye, np.float64) - mesh.origin).astype(np.float32)
-                self._split(base, prefix, inputs, stale, local_eye, alpha, weights, tolerance, job)
-                self._version[stale], self._alpha[stale] = base.version[stale], mine[stale]
+                ahead = np.float32(AHEAD if frame.moving else 1)  # a slider goes on the way it goes
+                self._split(base, prefix, inputs, stale, local_eye, ahead * alpha, weights, tolerance, job)
+                self._version[stale], self._alpha[stale] = base.version[stale], ahead * mine[stale]
         layers = []
         for node, tables in arriving.layers:
             pairs = [(table, self._table if table is base else None) for table in tables]
