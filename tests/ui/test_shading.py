@@ -9,7 +9,9 @@ import numpy as np
 from ui_support import Driver, Make, room
 
 from studio_core.edits import Move, SetFields, SetMaterial
+from studio_core.scene.diff import Aspect
 from studio_core.scene.transform import Transform
+from studio_core.session import View
 from studio_ui.feed import Freshness
 
 
@@ -100,6 +102,28 @@ def test_while_dragging_pictures_are_quick_and_at_rest_they_are_fine(driver: Dri
     view = driver.fake.frames[-1].view
     assert view.antialias == 2
     assert (view.width, view.height) == driver.feed.size
+
+
+def test_other_pixels_are_another_view_to_the_stages(driver: Driver) -> None:
+    asked: list[tuple[View, Aspect]] = []
+    request = driver.feed._scheduler.request
+    driver.feed._scheduler.request = lambda frame, changes: (
+        asked.append((frame.view, changes.aspects)),
+        request(frame, changes),
+    )[1]
+    driver.feed.hold()
+    for value in (0.7, 0.8):
+        driver.document.apply(SetMaterial("red", {"roughness": value}))
+        driver.until(lambda: driver.feed.last.moving and not driver.feed.busy)
+    (small, first), (same, then) = asked
+    assert small.width < driver.feed.size[0]
+    assert first & Aspect.VIEW
+    assert first & Aspect.MATERIAL
+    assert same == small
+    assert not then & Aspect.VIEW, "primary rays are kept"
+    driver.feed.release()
+    driver.settle()
+    assert asked[-1][1] & Aspect.VIEW
 
 
 def test_while_dragging_quick_pictures_grow(driver: Driver) -> None:

@@ -150,6 +150,7 @@ class PictureFeed:
         self._revision = 0
         self._outdated = 0  # pictures of revisions before this one are stale
         self._asked: dict[int, float] = {}
+        self._asked_view: View | None = None
         self._backend = session.backend
         self._scheduler = self._schedule()
         self._off = [document.changed.connect(self._edited), session.changed.connect(self._looked)]
@@ -280,6 +281,8 @@ class PictureFeed:
         self._answered = False
         quick = self.moving or self.last is None
         view = self.frame_view(quick)
+        if view != self._asked_view:  # other pixels concern stages as another eye does
+            changes, self._asked_view = changes | view_changed(), view
         frame = Frame(self._document.scene, view, self._session.params, moving=self.moving)
         asked, finer_only, self._finer_only = self._clock(), self._finer_only, True
         revision = self._revision = self._revision + 1  # as the scheduler counts
