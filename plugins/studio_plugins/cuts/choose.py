@@ -27,6 +27,7 @@ DEEPEST = 20
 MOST_NODES = 2048
 NODE = 8
 BLOCK = 64
+_WEIGHTS = np.array(LUMINANCE)
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,18 +44,49 @@ class Prefix:
     @staticmethod
     def of(tree: LightTree) -> Prefix:
         """The sums of a light tree."""
-        rows = np.empty((len(tree.prefix_power), 4, 4))
-        rows[:, 1:, 0], rows[:, 1:, 1:] = tree.prefix_power, tree.prefix_vector
-        rows[:, 0] = np.einsum("scx,c->sx", rows[:, 1:], np.array(LUMINANCE))
-        table = rows.reshape(-1, SUMS)
-        block = np.ascontiguousarray(table[::BLOCK])
-        leaf = (table - np.repeat(block, BLOCK, axis=0)[: len(table)]).astype(np.float32)
+        leaves = len(tree.prefix_power)
+        block = np.empty(((leaves - 1) // BLOCK + 1, SUMS))
+        leaf = np.empty((leaves, SUMS), np.float32)
+        _tables(tree.prefix_power, tree.prefix_vector, block, leaf)
         return Prefix(block, leaf)
 
     @property
     def power(self) -> float:
         """Luminance of ∫ L dω over the whole sphere."""
         return float(self.block[-1, 0] + self.leaf[-1, 0])
+
+
+@kernel
+def _tables(power: F64, vector: F64, block: F64, leaf: F32) -> None:
+    row = np.empty(SUMS)
+    for i in range(len(power)):
+        row[:4] = 0.0
+        for c in range(3):
+            weight = _WEIGHTS[c]
+            row[4 + 4 * c] = power[i, c]
+            row[0] += weight * power[i, c]
+            for x in range(3):
+                row[5 + 4 * c + x] = vector[i, c, x]
+                row[1 + x] += weight * vector[i, c, x]
+        if i % BLOCK == 0:
+            block[i // BLOCK] = row
+        for j in range(SUMS):
+            leaf[i, j] = row[j] - block[i // BLOCK, j]
+
+
+@kernel
+def add_up(runs: Pool, count: int, block: F64, leaf: F32, total: F32) -> None:
+    """total (16,) becomes the sums over all runs."""
+    for i in range(SUMS):
+        total[i] = np.float32(0)
+    for run in range(count):
+        start, stop = int(runs[2 * run]), int(runs[2 * run + 1]) + 1
+        for i in range(SUMS):
+            total[i] += leaf[stop, i] - leaf[start, i]
+        first, last = start // BLOCK, stop // BLOCK
+        if first != last:
+            for i in range(SUMS):
+                total[i] += np.float32(block[last, i] - block[first, i])
 
 
 @kernel

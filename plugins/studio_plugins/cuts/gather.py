@@ -13,7 +13,16 @@ import numpy.typing as npt
 from studio_core.colour import LUMINANCE
 from studio_core.jit import kernel
 from studio_core.kernels.radiance import frame
-from studio_plugins.cuts.choose import BLOCK, MOST_NODES, NODE, SUMS, accumulate, choose_nodes, index_runs
+from studio_plugins.cuts.choose import (
+    BLOCK,
+    MOST_NODES,
+    NODE,
+    SUMS,
+    accumulate,
+    add_up,
+    choose_nodes,
+    index_runs,
+)
 from studio_plugins.cuts.intervals import ONES, U64, Pool, clear, hide, runs_of, set_bits
 
 F32 = npt.NDArray[np.float32]
@@ -69,6 +78,7 @@ def gather_light(
     runs = np.empty(leaves + 2, pool.dtype)
     before = np.empty((leaves // 2 + 2, SUMS), np.float32)
     index = np.empty(leaves // BLOCK + 1, np.int64)
+    total = np.empty(SUMS, np.float32)
     axes = np.empty((3, 3))
     made = np.empty((MOST_NODES, NODE), np.float32)
     everything = np.zeros(skip.shape[2], np.bool_)
@@ -91,8 +101,12 @@ def gather_light(
             for i in range(2 * count):
                 out_runs[kept + i] = runs[i]
             kept += 2 * count
-        accumulate(runs, count, block, leaf, before)
-        total = before[count]
+        if glossy[p]:
+            accumulate(runs, count, block, leaf, before)
+            for i in range(SUMS):
+                total[i] = before[count, i]
+        else:
+            add_up(runs, count, block, leaf, total)
         red = max(nx * total[5] + ny * total[6] + nz * total[7], np.float32(0))
         green = max(nx * total[9] + ny * total[10] + nz * total[11], np.float32(0))
         blue = max(nx * total[13] + ny * total[14] + nz * total[15], np.float32(0))
