@@ -137,7 +137,8 @@ def test_irradiance_adds_up_for_any_cut(seed, share):
         width = S >> (cell.bit_length() - 1)
         covered[cell * width - S : (cell + 1) * width - S] += 1
     assert covered.max() == 1
-    assert (covered[free & (leaves.sum(axis=1) > 1e-3)] == 1).all()
+    arriving = (leaves @ LUMINANCE) * (DIRECTIONS.directions @ normal) / leaves.sum()
+    assert (covered[free & (arriving > 1e-5)] == 1).all()
 
 
 @pytest.mark.parametrize("seed", range(3))

@@ -61,8 +61,8 @@ class Gathered:
     runs: list
 
 
-def gathered(points, leaves, tolerance=0.0, known=None, kind=np.uint16, room=MOST_NODES * 4):
-    """By `gather_light`, or by `gather_difference` where irradiance is known."""
+def gathered(points, leaves, tolerance=0.0, known=None, kind=np.uint16, room=MOST_NODES * 4, runs_of=None):
+    """By `gather_light`, or by `gather_difference` where irradiance is known; runs of points, if kept."""
     count = len(points)
     prefix = Prefix.of(LightTree.build(leaves))
 
@@ -94,6 +94,11 @@ def gathered(points, leaves, tolerance=0.0, known=None, kind=np.uint16, room=MOS
         0.02 * prefix.power / 4,
     )
     irradiance, nodes = np.zeros((count, 3), np.float32), np.zeros(count, np.int64)
+    runs_of = runs_of or [None] * count
+    kept_runs = [[] if own is None else np.ravel(own).tolist() for own in runs_of]
+    kept_pool = np.array([n for own in kept_runs for n in own] + [0], kind)
+    kept_length = np.array([-1 if own is None else 2 * len(own) for own in runs_of], np.int32)
+    kept_start = np.cumsum([0, *map(len, kept_runs)])[:-1].astype(np.int64)
     made = Gathered(irradiance, [], [], [], [])
     begin = 0
     while begin < count:
@@ -102,8 +107,9 @@ def gathered(points, leaves, tolerance=0.0, known=None, kind=np.uint16, room=MOS
         run_count = np.zeros(count, np.int64)
         if known is None:
             stop = begin + gather_light(
-                begin, count, *given_, irradiance, out, nodes, detail, runs, run_count
-            )
+                begin, count, *given_, irradiance, out, nodes, detail,
+                kept_pool, kept_start, kept_length, runs, run_count,
+            )  # fmt: skip
         else:
             stop = begin + gather_difference(begin, count, *given_, known, irradiance, out, nodes)
         assert stop > begin
@@ -117,6 +123,7 @@ def gathered(points, leaves, tolerance=0.0, known=None, kind=np.uint16, room=MOS
                 own = detail[2 * place : 2 * (place + n)].reshape(n, 2)
                 made.spread.append(own[:, 0])
                 made.cells.append(own[:, 1].astype(int))
+            if known is None:
                 made.runs.append(runs[ran : ran + 2 * run_count[number]].reshape(-1, 2).tolist())
                 ran += 2 * run_count[number]
             place += n
@@ -286,4 +293,16 @@ def test_points_that_do_not_fit_are_done_the_next_time():
     tight = gathered(points, leaves, room=MOST_NODES)
     wide = gathered(points, leaves, room=8 * MOST_NODES)
     for a, b in zip(tight.nodes, wide.nodes, strict=True):
+        np.testing.assert_array_equal(a, b)
+
+
+def test_kept_runs_stand_in_for_records():
+    """Under another light nothing has to be read but runs; those of the rest are found and handed back."""
+    points, leaves = points_of(8), light(8)
+    first = gathered(points, light(9), 1e-2)
+    lost = [first.runs[0], None, first.runs[2], None]
+    found, whole = gathered(points, leaves, 1e-2, runs_of=lost), gathered(points, leaves, 1e-2)
+    assert found.runs == [[], first.runs[1], [], first.runs[3]]
+    np.testing.assert_array_equal(found.irradiance, whole.irradiance)
+    for a, b in zip(found.nodes, whole.nodes, strict=True):
         np.testing.assert_array_equal(a, b)

@@ -180,9 +180,7 @@ def test_nothing_is_added_for_vertices_without_nodes_or_wish(shapes, workers):
 
 def test_bytes_are_counted_with_what_splitting_needs():
     block = block_of(np.random.default_rng(5), range(3))
-    more = Detail(
-        np.zeros(4, np.float32), np.zeros(4, np.int32), np.zeros(4, np.int64), np.zeros(6, np.uint16)
-    )
+    more = Detail(np.zeros(4, np.float32), np.zeros(4, np.int32))
     whole = NodeBlock(block.points, block.first, block.data, more)
-    assert whole.nbytes - block.nbytes == more.nbytes == 16 + 16 + 32 + 12
+    assert whole.nbytes - block.nbytes == more.nbytes == 16 + 16
     assert block.most == np.diff(block.first).max()
