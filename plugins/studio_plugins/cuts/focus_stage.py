@@ -90,7 +90,8 @@ class FocusStage:
             mine = alpha[mesh.material]
             stale = (self._version != base.version) | (mine < SHARPER * self._alpha)
             stale &= seen.summed & (mine > 0)
-            self._table.drop((self._version != base.version) | (mine <= 0))
+            self._version[mine <= 0] = -1  # what gets sharp again is split again
+            self._table.drop(self._version != base.version)
             if stale.any():
                 weights = self._weights(frame.scene, inputs[Surfaces].materials)
                 local_eye = (np.asarray(eye, np.float64) - mesh.origin).astype(np.float32)

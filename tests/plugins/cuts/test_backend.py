@@ -345,7 +345,7 @@ EDITS: Mapping[str, Any] = {
     "remove a lamp": edits.Remove(("panel",)),
     "mesh": edits.SetGeometry("box", cube(0.4)),
 }
-RETURNS = {"move", "turn", "hide", "see through", "add", "remove", "move a lamp", "scale"}
+RETURNS = {"to matt", "move", "turn", "hide", "see through", "add", "remove", "move a lamp", "scale"}
 LOOKS = {"colour", "exponent", "model", "to matt", "assign"}  # nodes may stay split for another lobe
 
 
@@ -355,9 +355,7 @@ def test_an_edit_by_increments_is_as_afresh(bench, name):
     bench.assert_fresh(exact=name not in LOOKS)
 
 
-@pytest.mark.parametrize(
-    "name", ["move", "turn", "hide", "see through", "add", "remove", "move a lamp", "scale"]
-)
+@pytest.mark.parametrize("name", sorted(RETURNS))
 def test_and_back(bench, name):
     scene = bench.scene
     before = dict(bench.made.layers)
