@@ -434,6 +434,33 @@ def test_objects_in_another_order_keep_their_own_light(bench):
     bench.assert_fresh()
 
 
+@pytest.mark.parametrize(
+    "values",
+    [
+        {"directions": "4096"},
+        {"vertices": 500},
+        {"directions": "2048", "vertices": 500},
+        {"everywhere": True},
+        {"lamp_samples": 4},
+        {"quality": 1.0},
+    ],
+)
+def test_other_parameters_and_back(bench, host, values):
+    for wanted in ({**FAST, **values}, FAST):
+        bench.params = params_of(host, **wanted)
+        bench.update(view_changed(Aspect.QUALITY))
+        bench.assert_fresh(exact="quality" not in values)  # what was finer stays
+
+
+@pytest.mark.parametrize("light", ["sky", "bulb", "panel"])
+def test_what_moves_while_a_light_is_off(bench, light):
+    bench.do(edits.SetFields(light, {"hidden": True}))
+    bench.do(MOVE)
+    bench.do(EDITS["add"])
+    bench.do(edits.SetFields(light, {"hidden": False}))
+    bench.assert_fresh()
+
+
 def test_groups_are_one_thing_until_a_part_moves(host, services):
     scene = lit_scene().with_nodes(Group(id="g", name="G"))
     scene = edits.Reparent(("box", "sheet"), "g")(scene)
