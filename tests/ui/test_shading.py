@@ -19,6 +19,10 @@ def shift(driver: Driver, x: float) -> None:
     driver.document.apply(Move({"stool": Transform((x, 0.0, 0.0))}))
 
 
+def rough(driver: Driver, value: float) -> None:
+    driver.document.apply(SetMaterial("red", {"roughness": value}))
+
+
 def test_the_first_picture_is_shown_with_its_numbers(driver: Driver) -> None:
     assert driver.viewport.freshness is Freshness.CURRENT
     image = driver.viewport.grab_image()
@@ -55,23 +59,76 @@ def test_the_old_picture_stays_marked_while_a_new_one_is_made(make: Make) -> Non
 def test_an_edit_while_computing_cancels_and_the_newest_is_shown(make: Make) -> None:
     driver = make(threads=True)
     driver.show(room())
-    shown: list[tuple[float, float]] = []
+    shown: list[float] = []
     driver.feed.shown.connect(lambda s: shown.append(float(s.picture.distance.min())))
     driver.fake.gate = threading.Event()
     driver.fake.started.clear()
-    shift(driver, 1.5)
+    rough(driver, 0.55)
     driver.until(driver.fake.started.is_set)
     cancelled = driver.feed._scheduler.cancelled_jobs
-    for x in (1.6, 1.7, 1.8):
-        shift(driver, x)
+    for value in (0.6, 0.7, 0.8):
+        rough(driver, value)
     driver.until(lambda: driver.feed._scheduler.cancelled_jobs == cancelled + 1)
     assert shown == [], "what was cancelled is never shown"
     driver.fake.gate.set()
     driver.settle()
     assert driver.fake.frames[-1].scene is driver.document.scene
-    asked = [f.scene.world("stool").translation[0] for f in driver.fake.frames]
-    assert 1.6 not in asked, "what happened meanwhile is asked for once"
-    assert 1.7 not in asked
+    asked = [f.scene.material("red").values["roughness"] for f in driver.fake.frames]
+    assert 0.6 not in asked, "what happened meanwhile is asked for once"
+    assert 0.7 not in asked
+
+
+def test_a_single_move_is_first_seen_quickly(driver: Driver) -> None:
+    count = len(driver.fake.frames)
+    shift(driver, 1.5)
+    driver.settle()
+    glance, exact = driver.fake.frames[count:]
+    assert glance.moving
+    assert glance.view.width < driver.feed.size[0]
+    assert not exact.moving
+    assert exact.view.width == driver.feed.size[0]
+    rough(driver, 0.9)
+    driver.settle()
+    (exact,) = driver.fake.frames[count + 2 :]
+    assert not exact.moving, "what is soon exact needs no other"
+
+
+def test_keys_that_come_quicker_than_pictures_are_seen_on_their_way(make: Make) -> None:
+    driver = make(threads=True)
+    driver.show(room())
+    driver.fake.gate = threading.Event()
+    driver.fake.started.clear()
+    cancelled = driver.feed._scheduler.cancelled_jobs
+    shift(driver, 1.1)
+    driver.until(driver.fake.started.is_set)
+    shown: list[float] = []
+    driver.feed.shown.connect(
+        lambda s: shown.append(driver.fake.frames[-1].scene.world("stool").translation[0])
+    )
+    for x in (1.2, 1.3, 1.4):
+        shift(driver, x)
+        driver.bot.wait(5)
+    assert driver.feed._scheduler.cancelled_jobs == cancelled
+    driver.fake.gate.set()
+    driver.settle()
+    assert shown[0] == 1.1
+    assert driver.fake.frames[-1].scene is driver.document.scene
+
+
+def test_a_drag_does_not_wait_for_an_exact_picture(make: Make) -> None:
+    driver = make(threads=True)
+    driver.show(room())
+    driver.fake.gate = threading.Event()
+    driver.fake.started.clear()
+    rough(driver, 0.55)
+    driver.until(driver.fake.started.is_set)
+    cancelled = driver.feed._scheduler.cancelled_jobs
+    driver.feed.hold()
+    shift(driver, 1.5)
+    driver.until(lambda: driver.feed._scheduler.cancelled_jobs == cancelled + 1)
+    driver.fake.gate.set()
+    driver.feed.release()
+    driver.settle()
 
 
 def test_a_change_of_name_computes_nothing(driver: Driver) -> None:

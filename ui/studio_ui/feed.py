@@ -1,7 +1,8 @@
 """From changes of document and session to pictures: what to ask the scheduler for, and how finely.
 
-While somebody drags or looks around, pictures are unsmoothed, as small as they must be to come quickly, and a
-new one is asked for as soon as the last one was seen; at rest one full, smoothed picture follows. No Qt here.
+While somebody drags or looks around, pictures are unsmoothed, as small as they must be to come quickly, and
+each is asked for as soon as the last was seen; at rest one full, smoothed picture follows. Single moves
+and undo are shown like that too before they are exact. No Qt here.
 """
 
 from __future__ import annotations
@@ -25,6 +26,8 @@ from studio_core.shading.scheduler import Executor, Scheduler
 from studio_core.signal import Signal
 from studio_ui.pace import Pace
 
+_SLOW = Aspect.TRANSFORM | Aspect.STRUCTURE
+"""What takes long to be exact: also a single step of it, such as undo, is first seen quickly."""
 REST_MS = 260
 REST_PIXELS, REST_SAMPLES = 2_400_000, 4_500_000
 
@@ -151,6 +154,7 @@ class PictureFeed:
         self._outdated = 0  # pictures of revisions before this one are stale
         self._asked: dict[int, float] = {}
         self._asked_view: View | None = None
+        self._glance = self._hurried = False  # one quick picture first; whether the last asked for was
         self._backend = session.backend
         self._scheduler = self._schedule()
         self._off = [document.changed.connect(self._edited), session.changed.connect(self._looked)]
@@ -257,6 +261,7 @@ class PictureFeed:
 
     def _edited(self, before: Scene, after: Scene, changes: Changes) -> None:
         if changes.aspects & ~Aspect.NAME:
+            self._glance |= bool(changes.aspects & _SLOW) and self.last is not None
             self.want(changes)
 
     def _looked(self, aspect: Aspect) -> None:
@@ -275,15 +280,17 @@ class PictureFeed:
             return
         if self.last is None and not self._document.scene.nodes:
             return  # there is nothing to see; the changes are kept
-        if self.moving and self._scheduler.busy and not self._answered:
-            return  # let one picture be seen before asking for the next
+        moving = self.moving or self._glance
+        if moving and self._hurried and self._scheduler.busy and not self._answered:
+            return  # let one quick picture be seen before asking for the next
         changes, self._changes = self._changes, Changes()
         self._answered = False
-        quick = self.moving or self.last is None
+        self._glance, self._hurried = False, moving
+        quick = moving or self.last is None
         view = self.frame_view(quick)
         if view != self._asked_view:  # other pixels concern stages as another eye does
             changes, self._asked_view = changes | view_changed(), view
-        frame = Frame(self._document.scene, view, self._session.params, moving=self.moving)
+        frame = Frame(self._document.scene, view, self._session.params, moving=moving)
         asked, finer_only, self._finer_only = self._clock(), self._finer_only, True
         revision = self._revision = self._revision + 1  # as the scheduler counts
         self._asked[revision] = asked
