@@ -15,7 +15,7 @@ from scenes import cube, little_scene, sky
 from studio_core import edits
 from studio_core.arrays import frozen_map
 from studio_core.contract import Services
-from studio_core.errors import Cancelled
+from studio_core.errors import Cancelled, EditError
 from studio_core.parallel import Workers
 from studio_core.scene.diff import Aspect, Changes, diff, view_changed
 from studio_core.scene.geometry import Geometry, Image
@@ -394,12 +394,32 @@ def test_cancelled_frames_leave_nothing_behind(bench, name, at):
     bench.assert_fresh(exact=False)
 
 
-def test_every_edit_after_every_other(bench):
-    rng = np.random.default_rng(7)
-    names = [name for name in EDITS if name not in LOOKS | {"remove", "remove a lamp", "move the floor"}]
-    for step, name in enumerate(rng.permutation(names)):
-        with contextlib.suppress(Cancelled):
-            bench.do(EDITS[name], StoppingJob(int(rng.integers(1, 60))), moving=bool(step % 3 == 1))
+@pytest.mark.parametrize("seed", range(6))
+def test_random_sessions(host, services, seed):
+    """Edits, undo and looks around, some while a hand moves, some cancelled anywhere."""
+    rng = np.random.default_rng(seed)
+    scene = lit_scene()
+    if seed % 3 == 0:
+        scene = edits.Reparent(("box", "sheet"), "g")(scene.with_nodes(Group(id="g", name="G")))
+    bench = Bench(scene, host, services)
+    views = [
+        bench.view.transform,
+        looking((-2.5, 1.2, -3.0), (0, 0.4, 0)),
+        looking((0.2, 3.5, 0.1), (0, 0, 0)),
+    ]
+    history, names = [bench.scene], list(EDITS)
+    for _ in range(7):
+        kind, moving = rng.integers(0, 10), bool(rng.random() < 0.35)
+        job = StoppingJob(int(rng.integers(1, 40))) if rng.random() < 0.3 else None
+        with contextlib.suppress(Cancelled, EditError):  # some things are gone already
+            if kind < 6:
+                bench.do(EDITS[names[rng.integers(len(names))]], job, moving)
+            elif kind < 8:
+                now, bench.scene = bench.scene, history[rng.integers(len(history))]
+                bench.update(diff(now, bench.scene), job, moving)
+            else:
+                bench.look(views[rng.integers(3)], moving)
+        history.append(bench.scene)
     bench.rest()
     bench.assert_fresh(exact=False)
 
