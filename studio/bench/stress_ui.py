@@ -1,8 +1,8 @@
-"""`lucarne stress ui`: does the window stay free while the reference computes?
+"""`lucarne stress ui`: does the window stay free while pictures are computed?
 
-Opens the sample room (offscreen unless a platform is set), lets the reference work at 2^15 directions, and
-meanwhile edits, orbits and undoes like somebody in a hurry. Prints how long the window's thread was away
-(stall), how long a cancelled job went on (cancel), and how long the first picture after an edit took.
+Opens the sample room (offscreen unless a platform is set) with the window's own backend, and edits and undoes
+like somebody in a hurry. Prints how long the window's thread was away (stall), how long a cancelled job went
+on (cancel), and how long the first picture after an edit took.
 """
 
 from __future__ import annotations
@@ -48,6 +48,7 @@ def run(report: Report, program: Headless) -> None:
     studio.close()
     if not hurry.done:
         raise LucarneError("the window did not get through the edits in four minutes")
+    report.notes.append(_circumstances(studio.context.session.backend))
     for name, values in (
         ("stall", hurry.stalls),
         ("cancel", hurry.cancels),
@@ -57,6 +58,14 @@ def run(report: Report, program: Headless) -> None:
         for percentile in (50, 99, 100):
             report.add("ui", f"{name}_p{percentile}_ms", float(np.percentile(milliseconds, percentile)), "ms")
         report.add("ui", f"{name}_count", len(values), "1")
+
+
+def _circumstances(backend: str) -> str:
+    """What the figures depend on, in words."""
+    said = f"Backend `{backend}`, edits of one chair at a time, and undo."
+    if hasattr(os, "getloadavg"):
+        said += f" Load of the machine at the end, others included: {os.getloadavg()[0]:.1f}."
+    return said
 
 
 class _Hurry:
