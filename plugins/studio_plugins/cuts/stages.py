@@ -101,7 +101,7 @@ class VisibilityStage:
         """The previous where nobody sees anything else; publishes coarse steps of what is new."""
         surfaces, hits = inputs[Surfaces], inputs[Hits]
         k = int(frame.params.directions).bit_length() - 1
-        if self._store is None or self._store.k != k:
+        if self._store is None or self._store.k != k or self._store.full:
             self._store = VisibilityStore(k, self._workers)
         store = self._store
         generation = store.generation
@@ -210,6 +210,7 @@ class LightStage:
         self._paper = PaperLight(services.workers)
         self._lamps: dict[NodeId, LampCache] = {}
         self._lobes = LobeTable()
+        self._repeated: tuple[LightTree, LightTree] | None = None
         self._placed: dict[NodeId, tuple[object, Transform]] = {}
         self._spheres: dict[NodeId, tuple[npt.NDArray[np.float64], float]] = {}
 
@@ -223,7 +224,7 @@ class LightStage:
         glossy = by_material[mesh.material]
         summed = looked = 0
         if lighting.environment is not None and lighting.tree is not None:
-            tree = fitted(lighting.tree, seen.store.k)
+            tree = self._fitted(lighting.tree, seen.store.k)
             if frame.params.method == PAPER:
                 shells, k = frame.params.shells, min(tree.k, HIGHEST_K)
                 paper = PaperParams(k=k, shells=shells, cells=shells)
@@ -267,6 +268,14 @@ class LightStage:
             settled[node] = own & settled[node] if node in settled else own
         kept = self._environment
         return Arriving(layers, newest, environment, kept.prefix, kept.runs, settled, summed, looked)
+
+    def _fitted(self, tree: LightTree, k: int) -> LightTree:
+        """The tree over 2^k leaves; of a coarser one every leaf is repeated."""
+        if tree.k >= k:
+            return tree.coarsened(k)
+        if self._repeated is None or self._repeated[0] is not tree or self._repeated[1].k != k:
+            self._repeated = tree, LightTree.build(np.repeat(tree.radiance, 1 << (k - tree.k), axis=0))
+        return self._repeated[1]
 
     def _tables(self, lighting: Lighting, exact: bool) -> list[tuple[NodeId, tuple[NodeTable, ...]]]:
         made: list[tuple[NodeId, tuple[NodeTable, ...]]] = []
@@ -314,13 +323,6 @@ class LightStage:
             made = []  # nothing was looked at yet
         self._placed, self._spheres = now, spheres
         return made
-
-
-def fitted(tree: LightTree, k: int) -> LightTree:
-    """The tree over 2^k leaves; of a coarser one every leaf is repeated."""
-    if tree.k >= k:
-        return tree.coarsened(k)
-    return LightTree.build(np.repeat(tree.radiance, 1 << (k - tree.k), axis=0))
 
 
 def _same(a: Sequence[tuple[NodeId, Any]], b: Sequence[tuple[NodeId, Any]]) -> bool:

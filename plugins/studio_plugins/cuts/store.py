@@ -43,6 +43,7 @@ Points = I64
 
 CHUNK = {True: 32, False: 160}  # of whole records, and of coarse ones
 BATCH = 4096
+MOST_SLOTS = 60_000
 _NUMBERS_A_RECORD = {True: 4096, False: 256}  # room that is made at first
 
 
@@ -205,6 +206,11 @@ class VisibilityStore:
             np.where(usable, self._coarse.stamp, self.exact.stamp),
             self.exact.stamp,
         )
+
+    @property
+    def full(self) -> bool:
+        """Whether slots, which are never used again, will soon have no number left in a record."""
+        return len(self._slot_of) > MOST_SLOTS
 
     @property
     def known(self) -> int:
