@@ -128,8 +128,8 @@ def test_a_cancelled_trace_goes_on_where_it_was(kit, workers, job, fresh, monkey
     bench = Bench(kit.room, workers, job)
     with pytest.raises(Cancelled):
         bench.traced(job=StoppingJob(12))
-    known = bench.store.known
-    assert 0 < known < len(kit.room.mesh)
+    known, all_of_them = bench.store.known, len(kit.room.mesh)
+    assert 0 < known < all_of_them
     bench.traced()
     assert bench.rays == whole
     assert_fresh(bench, fresh, kit)
@@ -145,7 +145,8 @@ def test_cancelled_anywhere_and_moved_elsewhere(kit, workers, job, fresh, at, fi
         try:
             bench.traced(job=StoppingJob(at))
         except Cancelled:
-            assert bench.store.known < len(kit.room.mesh)
+            known, whole = bench.store.known, len(kit.room.mesh)
+            assert known < whole
         bench.follow(kit.room.placed(**MOVES[second])).traced()
     assert_fresh(bench, fresh, kit)
 
