@@ -54,8 +54,8 @@ Bools = npt.NDArray[np.bool_]
 EXACT, PAPER = "exact", "svc-vcf"
 FIRST_LEVELS = (10, 12)
 """Fineness of the first pictures of a scene of which nothing is known."""
-COARSEST, FINEST = 10, 13
-SLOW, QUICK = 0.06, 0.03
+COARSEST, FINEST = 11, 13
+SLOW, QUICK = 0.1, 0.035
 """Fineness of previews, and seconds of one after which the next is coarser, or finer."""
 
 
