@@ -126,7 +126,7 @@ def test_samples_of_any_triangle(corners, uvs, level, distance, density, kind):
         shade_hits(0, 1, *hit, *given_faces, *maps, 0.01, PIXELS[:0, :3], out)
         assert np.isfinite(out).all()
         assert (out >= 0).all()
-        assert (out <= 3.001 * level).all()
+        assert (out <= 4.001 * level).all()  # a plain part and three textured ones
 
 
 @given(RADIANCE, st.floats(0.01, 179.9), st.tuples(*[st.floats(-1, 1)] * 3), st.integers(1, 4))
