@@ -7,7 +7,7 @@ group that is spread out: whoever moves one chair of sixty should not pay for th
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Hashable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import cast
 
@@ -42,9 +42,9 @@ def alone(surfaces: Surfaces, casters: Casters) -> Occluders:
     return Occluders(casters.shadow, keys, casters.transforms, np.arange(len(keys), dtype=np.int32))
 
 
-def occluder_keys(surfaces: Surfaces, casters: Casters) -> list[object]:
+def occluder_keys(surfaces: Surfaces, casters: Casters) -> list[tuple[str, Hashable]]:
     """What makes an object another occluder: its mesh, and which of its faces stop light."""
-    opaque = [stops for _, stops in cast(Iterable[tuple[str, object]], casters.meshes)]
+    opaque = [stops for _, stops in cast(Iterable[tuple[str, Hashable]], casters.meshes)]
     return [(source[1].key, stops) for source, stops in zip(surfaces.sources, opaque, strict=True)]
 
 

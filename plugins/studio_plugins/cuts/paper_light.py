@@ -50,13 +50,9 @@ class PaperLight:
             return 0
         todo = np.setdiff1d(points, self._points) if same else points
         self._known, self._points = (), np.zeros(0, np.int64)
-        self.path.place(mesh, casters.shadow, [_hashable(key) for key in occluder_keys(surfaces, casters)])
+        self.path.place(mesh, casters.shadow, occluder_keys(surfaces, casters))
         self.path.prepare(todo, job)
         self.table.irradiance[todo] = self.path.irradiance(todo, tree, job)
         self.table.replace(self.path.nodes(todo, tree, job))
         self._known, self._points = known, points
         return len(todo)
-
-
-def _hashable(key: object) -> tuple[object, ...]:
-    return key if isinstance(key, tuple) else (key,)

@@ -39,7 +39,7 @@ from studio_plugins.cuts.lamps import LampCache, Source, lamp_source, sphere
 from studio_plugins.cuts.light_cache import LightCache
 from studio_plugins.cuts.lobes import LobeTable
 from studio_plugins.cuts.nodes import NodeTable
-from studio_plugins.cuts.occluders import Occluders, OccluderTable
+from studio_plugins.cuts.occluders import Occluders, OccluderTable, occluder_keys
 from studio_plugins.cuts.paper.height_cuts import HIGHEST_K
 from studio_plugins.cuts.paper.settings import PaperParams
 from studio_plugins.cuts.paper_light import PaperLight
@@ -309,9 +309,9 @@ class LightStage:
         now: dict[NodeId, tuple[object, Transform]] = {}
         spheres: dict[NodeId, tuple[npt.NDArray[np.float64], float]] = {}
         made: list[tuple[int | None, list[tuple[npt.NDArray[np.float64], float]]]] = []
+        keys = occluder_keys(surfaces, casters)
         for index, node in enumerate(surfaces.nodes):
-            stops = casters.meshes[index][1]  # type: ignore[index]
-            now[node] = ((surfaces.sources[index][1].key, stops), casters.transforms[index])
+            now[node] = keys[index], casters.transforms[index]
             if self._placed.get(node) == now[node]:
                 spheres[node] = self._spheres[node]
                 continue
