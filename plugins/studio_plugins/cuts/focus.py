@@ -162,13 +162,12 @@ def focus_nodes(
     leaf: F32,
     tolerance: np.float32,
     out: F32,
-    detail: F32,
     nodes: I64,
 ) -> int:
     """Nodes of those of points[begin:stop] that are wanted and owned by this block, split where needed.
 
     weights (M, T) luminous coefficients of each material's terms, alpha (M,) widths of lobes (0: leave the
-    material alone); tolerance is a node's share of the point's radiance. `out` and `detail` as in
+    material alone); tolerance is a node's share of the point's radiance. `out` is as in
     `gather_light`; nodes (P,) are counted, -1: the point keeps what it has. Returns how many points fitted.
     """
     leaves = len(leaf) - 1
@@ -277,8 +276,5 @@ def focus_nodes(
         for line in range(6):
             for node in range(found):
                 out[6 * place + line * found + node] = made[node, line]
-        for node in range(found):
-            detail[2 * (place + node)] = made[node, 6]
-            detail[2 * (place + node) + 1] = made[node, 7]
         place += found
     return stop - begin

@@ -18,9 +18,8 @@ from studio_core.shading.materials import coefficients, resolve
 from studio_core.shading.pipeline import Inputs
 from studio_plugins.cuts.choose import MOST_NODES, Prefix
 from studio_plugins.cuts.focus import focus_nodes
-from studio_plugins.cuts.light_cache import starts
 from studio_plugins.cuts.lobes import LobeTable
-from studio_plugins.cuts.nodes import FLOATS, NodeBlock, NodeTable
+from studio_plugins.cuts.nodes import FLOATS, NodeBlock, NodeTable, starts
 from studio_plugins.cuts.quality import quality
 from studio_plugins.cuts.stages import Arriving, Seen
 
@@ -84,7 +83,7 @@ class FocusStage:
                 self._table = self._table.resized(count)
                 self._version, self._alpha = np.full(count, -1, np.int64), np.zeros(count, np.float32)
                 self._state = state
-            else:
+            elif self._positions is not mesh.positions:
                 self._version[(self._positions != mesh.positions).any(axis=1)] = -1
             self._positions = mesh.positions
             mine = alpha[mesh.material]
@@ -134,7 +133,7 @@ class FocusStage:
             begin = 0
             while begin < len(block.points):
                 room = MOST_NODES + _ROOM * (len(block.points) - begin)
-                out, more = np.empty(FLOATS * room, np.float32), np.empty(2 * room, np.float32)
+                out = np.empty(FLOATS * room, np.float32)
                 done = focus_nodes(
                     begin,
                     len(block.points),
@@ -163,7 +162,6 @@ class FocusStage:
                     prefix.leaf,
                     np.float32(tolerance),
                     out,
-                    more,
                     counts,
                 )
                 own = counts[begin : begin + done]

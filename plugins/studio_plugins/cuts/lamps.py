@@ -20,7 +20,7 @@ from studio_core.scene.world_mesh import WorldMesh
 from studio_core.shading.artifacts import Lamp
 from studio_core.shading.job import Job
 from studio_core.shading.lamps import lamp_light, lamp_targets
-from studio_plugins.cuts.nodes import NodeBlock, NodeTable
+from studio_plugins.cuts.nodes import NodeBlock, NodeTable, starts
 from studio_plugins.cuts.store import VisibilityStore
 
 F32 = npt.NDArray[np.float32]
@@ -196,8 +196,7 @@ class LampCache:
                 out,
                 nodes,
             )
-            starts = np.concatenate([[0], np.cumsum(nodes)]).astype(np.int64)
-            blocks.append(NodeBlock(block, starts, out[:length].copy()))
+            blocks.append(NodeBlock(block, starts(nodes), out[:length].copy()))
         if blocks:
             self.table.replace(blocks)
             self._state[todo] = enough

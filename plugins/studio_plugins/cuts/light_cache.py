@@ -13,7 +13,7 @@ from studio_core.scene.world_mesh import WorldMesh
 from studio_core.shading.job import Job
 from studio_plugins.cuts.choose import MOST_NODES, Prefix
 from studio_plugins.cuts.gather import gather_difference, gather_light
-from studio_plugins.cuts.nodes import FLOATS, Detail, NodeBlock, NodeTable
+from studio_plugins.cuts.nodes import FLOATS, Detail, NodeBlock, NodeTable, starts
 from studio_plugins.cuts.records import Records
 from studio_plugins.cuts.store import Sources, VisibilityStore
 
@@ -196,11 +196,6 @@ class LightCache:
             self.runs.write(points[fresh], [seen[begin] for begin in sorted(seen)], length, 1)
             self.runs.tidy()
             self._run_stamp[points[fresh]] = sources.stamp[points[fresh]]
-
-
-def starts(counts: I64) -> I64:
-    """Where each of so many begins, and where the last ends."""
-    return np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
 
 
 def _mostly(sources: Sources, points: I64) -> Bools:

@@ -201,3 +201,8 @@ class NodeTable:
 
         workers.run(len(numbered), _BLOCKS_A_CHUNK, body, job)
         return int(looked.sum())
+
+
+def starts(counts: I64) -> I64:
+    """Where each of so many begins, and where the last ends."""
+    return np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)

@@ -62,7 +62,8 @@ class RadianceStage:
         other = np.append(changed, True)[mesh.material]
         if numbers == self._numbers:  # who moves sees the eye elsewhere
             other |= self._material != mesh.material
-            other |= (self._positions != mesh.positions).any(axis=1)
+            if self._positions is not mesh.positions:
+                other |= (self._positions != mesh.positions).any(axis=1)
         summed = seen.summed
         layers: dict[NodeId, LayerRadiance] = {}
         kept: dict[NodeId, _Layer] = {}
