@@ -17,6 +17,7 @@ from studio_core.shading.job import Job
 from studio_core.shading.pipeline import Pipeline
 from studio_core.shading.stages import Adaptive, SurfaceParams, common_stages
 from studio_plugins.cuts.focus_stage import FocusStage
+from studio_plugins.cuts.lobes import LobeTable
 from studio_plugins.cuts.quality import quality
 from studio_plugins.cuts.radiance_stage import RadianceStage
 from studio_plugins.cuts.stages import EXACT, PAPER, LightStage, VisibilityStage
@@ -77,11 +78,12 @@ class Cuts:
 
     def stages(self, services: Services) -> Sequence[Any]:
         """Fresh stages, the last gives Radiance."""
+        lobes = LobeTable()
         return [
             *common_stages(services, _adaptive),
             VisibilityStage(services),
-            LightStage(services),
-            FocusStage(services),
+            LightStage(services, lobes),
+            FocusStage(services, lobes),
             RadianceStage(services),
         ]
 

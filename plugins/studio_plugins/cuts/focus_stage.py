@@ -52,9 +52,9 @@ class FocusStage:
     gives = Focused
     dirtied_by = Aspect.VIEW | Aspect.QUALITY | Aspect.MATERIAL
 
-    def __init__(self, services: Services) -> None:
+    def __init__(self, services: Services, lobes: LobeTable) -> None:
         self._workers = services.workers
-        self._lobes = LobeTable()
+        self._lobes = lobes
         self._weights = LobeWeights(services.registry)
         self._table = NodeTable(0)
         self._version: I64 = np.zeros(0, np.int64)

@@ -204,12 +204,12 @@ class LightStage:
     gives = Arriving
     dirtied_by = Aspect.QUALITY | Aspect.VIEW
 
-    def __init__(self, services: Services) -> None:
+    def __init__(self, services: Services, lobes: LobeTable) -> None:
         self._workers = services.workers
         self._environment = LightCache(services.workers)
         self._paper = PaperLight(services.workers)
         self._lamps: dict[NodeId, LampCache] = {}
-        self._lobes = LobeTable()
+        self._lobes = lobes
         self._repeated: tuple[LightTree, LightTree] | None = None
         self._placed: dict[NodeId, tuple[object, Transform]] = {}
         self._spheres: dict[NodeId, tuple[npt.NDArray[np.float64], float]] = {}
