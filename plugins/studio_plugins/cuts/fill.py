@@ -22,27 +22,47 @@ _DARK = np.float32(1e-12)
 def fill(between: I64, summed: Bools, wanted: Bools, settled: Bools, terms: F32, irradiance: F32) -> None:
     """Sets terms (V, T, 3) and, but for the settled, irradiance (V, 3) of wanted vertices.
 
-    `between` (V, 2) are summed or wanted vertices of lower number; those that are `summed` give theirs.
+    `between` (V, 2) are vertices of lower number, twice itself where refinement did not make the vertex: each
+    is `summed`, and gives its own, or lies between others that are, wanted or not.
     """
     count = len(terms)
     share = np.empty((count, terms[0].size if count else 0), np.float32)
-    _fill(between, summed, wanted, settled, terms.reshape(count, -1), irradiance, share)
+    level, needed = np.empty_like(irradiance), wanted.copy()
+    flat = terms.reshape(count, -1)
+    _fill(between, summed, wanted, settled & wanted, needed, flat, irradiance, share, level)
 
 
 @kernel
 def _fill(
-    between: I64, summed: Bools, wanted: Bools, settled: Bools, terms: F32, irradiance: F32, share: F32
+    between: I64,
+    summed: Bools,
+    wanted: Bools,
+    settled: Bools,
+    needed: Bools,
+    terms: F32,
+    irradiance: F32,
+    share: F32,
+    level: F32,
 ) -> None:
     half = np.float32(0.5)
+    for i in range(len(between) - 1, -1, -1):
+        if needed[i] and not summed[i]:
+            needed[between[i, 0]] = True
+            needed[between[i, 1]] = True
     for i in range(len(between)):
         if summed[i]:
+            for c in range(3):
+                level[i, c] = irradiance[i, c]
             for c in range(terms.shape[1]):
                 share[i, c] = terms[i, c] / max(irradiance[i, c % 3], _DARK)
-        elif wanted[i]:
+        elif needed[i]:
             one, other = between[i, 0], between[i, 1]
-            if not settled[i]:
-                for c in range(3):
-                    irradiance[i, c] = half * (irradiance[one, c] + irradiance[other, c])
+            for c in range(3):
+                level[i, c] = irradiance[i, c] if settled[i] else half * (level[one, c] + level[other, c])
             for c in range(terms.shape[1]):
                 share[i, c] = half * (share[one, c] + share[other, c])
-                terms[i, c] = share[i, c] * irradiance[i, c % 3]
+            if wanted[i]:  # what others only lie between keeps what it has
+                for c in range(3):
+                    irradiance[i, c] = level[i, c]
+                for c in range(terms.shape[1]):
+                    terms[i, c] = share[i, c] * level[i, c % 3]

@@ -54,3 +54,16 @@ def test_others_are_left_alone():
     fill(between, np.array([True, True, False, False]), wanted, np.zeros(4, np.bool_), terms, irradiance)
     assert (terms[3] == 7).all()
     np.testing.assert_allclose(terms[2], 1)
+
+
+def test_what_nobody_sees_is_passed_through_and_keeps_what_it_has():
+    between = np.array([[0, 0], [1, 1], [2, 2], [0, 1], [2, 3]])
+    summed, wanted = np.arange(5) < 3, np.arange(5) == 4
+    irradiance = np.array([[1], [3], [4], [np.nan], [0]], np.float32) * np.ones(3, np.float32)
+    terms = np.repeat(irradiance[:, None] / 2, 3, axis=1)
+    for settled in (np.zeros(5, np.bool_), np.arange(5) == 3):
+        fill(between, summed, wanted, settled, terms, irradiance)
+        np.testing.assert_allclose(irradiance[4], 3)  # of 4 and the mean of 1 and 3
+        np.testing.assert_allclose(terms[4], 1.5)
+        assert np.isnan(terms[3]).all()
+        assert np.isnan(irradiance[3]).all()
