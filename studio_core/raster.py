@@ -37,7 +37,7 @@ from studio_core.scene.diff import Aspect
 from studio_core.scene.nodes import Environment, Light, Scene
 from studio_core.scene.transform import rotation_matrix
 from studio_core.session import View
-from studio_core.shading.artifacts import TERMS, Hits, Picture, Radiance, Surfaces
+from studio_core.shading.artifacts import TERMS, Backdrop, Hits, Picture, Radiance, Surfaces, VertexColours
 from studio_core.shading.coefficients import Coefficients, CoefficientTable, Maps
 from studio_core.shading.frame import Frame
 from studio_core.shading.job import Job
@@ -157,11 +157,10 @@ class Compositor:
         layers = self._layers(lambda: _layers(hits, surfaces), hits, surfaces.opacity, mesh.face_material)
         outline = self._outline(lambda: self._look(hits, surfaces, job), hits, mesh.faces, mesh.object)
         environment = shown_environment(scene)
-        if environment is None or not environment.background:
-            background = NO_COLOUR
-        else:
-            shown = environment
-            background = self._background(lambda: self._behind(shown, layers, job), layers, shown)
+        backdrop, background = None, NO_COLOUR
+        if environment is not None and environment.background:
+            sky = backdrop = self._backdrop(environment)
+            background = self._background(lambda: self._behind(sky, layers, job), layers, environment)
         faces = self._faces(surfaces, view, table.maps)
         tables = self._tables(scene, radiance, table, view, job)
         given = (hits.face, hits.u, hits.v, hits.distance, *faces, *tables)
@@ -175,7 +174,8 @@ class Compositor:
             values = self._hits(layer.hits, faces, tables, job)
             add_samples(layer.samples, hits.samples**2, layer.weight, values, out)
         linear = out.reshape(view.height, view.width, 3)
-        return Picture(radiance, linear, outline.coverage, outline.node, outline.distance)
+        colours = VertexColours(tables.record, tables.sums, table.maps, backdrop)
+        return Picture(radiance, linear, outline.coverage, outline.node, outline.distance, colours)
 
     def radiance(
         self, scene: Scene, radiance: Radiance, hits: Hits, table: Coefficients, job: Job | None = None
@@ -266,15 +266,17 @@ class Compositor:
         self._workers.run(node.size, PIXELS, look, job)
         return _Outline(coverage, node, distance)
 
-    def _behind(self, environment: Environment, layers: tuple[_Layer, ...], job: Job | None) -> F32:
+    def _backdrop(self, environment: Environment) -> Backdrop:
+        pixels = self._sky(lambda: readonly(linear_rgb(environment.image), np.float32), environment.image)
+        to_picture = environment.rotation().matrix()[:3, :3].T
+        return Backdrop(pixels, to_picture.astype(np.float32), np.array(environment.gain(), np.float32))
+
+    def _behind(self, backdrop: Backdrop, layers: tuple[_Layer, ...], job: Job | None) -> F32:
         """(P, 3) what of the environment is seen beside objects and through them."""
         view = layers[0].hits.view
         lens = pinhole(view)
-        to_picture = environment.rotation().matrix()[:3, :3].T
-        turn = np.ascontiguousarray(to_picture @ rotation_matrix(view.transform.rotation), np.float32)
-        pixels = self._sky(lambda: readonly(linear_rgb(environment.image), np.float32), environment.image)
-        gain = np.array(environment.gain(), np.float32)
-        sky = (turn, pixels, gain)
+        turn = np.ascontiguousarray(backdrop.turn @ rotation_matrix(view.transform.rotation), np.float32)
+        sky = (turn, backdrop.pixels, backdrop.gain)
 
         def look(start: int, stop: int, values: F32) -> None:
             background_hits(start, stop, lens, EVERY, layers[0].hits.face, *sky, values)

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from studio_core.kernels.suns import Sun
     from studio_core.scene.face_tree import FaceTree
     from studio_core.scene.world_mesh import WorldMesh
+    from studio_core.shading.coefficients import Maps
 
 Source: TypeAlias = tuple[NodeId, Geometry, tuple[MaterialId, ...]]
 """An object, its mesh, the material of each slot."""
@@ -205,11 +206,38 @@ class Radiance:
         return made
 
 
+@dataclass(frozen=True, eq=False)
+class Backdrop:
+    """What is seen beside objects: an equirectangular picture (H, W, 3), times `gain` (3,).
+
+    `turn` (3, 3) leads from the world to the picture's own frame.
+    """
+
+    pixels: F32
+    turn: F32
+    gain: F32
+
+
+@dataclass(frozen=True, eq=False)
+class VertexColours:
+    """What a picture interpolates, for canvases that do so themselves.
+
+    record (V, 8), sums (V or 0, TERMS·3) and maps as in `kernels.compose.shade_hits`; they hold where
+    `Radiance.valid`. `backdrop` is None where none is shown.
+    """
+
+    record: F32
+    sums: F32
+    maps: Maps
+    backdrop: Backdrop | None
+
+
 @dataclass(frozen=True)
 class Picture:
     """What the camera sees: scene-linear (H, W, 3), coverage (H, W), node index (H, W) with -1 for nothing.
 
     `distance` (H, W) is metres along the ray of a pixel's first sample, inf where it meets nothing.
+    `colours` are what the pixels were made from.
     """
 
     radiance: Radiance
@@ -217,6 +245,7 @@ class Picture:
     coverage: F32
     node: npt.NDArray[np.int32]
     distance: F32
+    colours: VertexColours | None = None
 
     @property
     def nodes(self) -> tuple[NodeId, ...]:
@@ -255,6 +284,7 @@ class MeasuredError:
 
 __all__ = [
     "TERMS",
+    "Backdrop",
     "Casters",
     "ChosenPoints",
     "Error",
@@ -269,4 +299,5 @@ __all__ = [
     "Shapes",
     "Source",
     "Surfaces",
+    "VertexColours",
 ]
