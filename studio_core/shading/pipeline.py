@@ -6,7 +6,8 @@ stage until it succeeds, so cancelled work is not forgotten. A stage that return
 publishes flows through the stages after it.
 
 When all stages are through and the frame is at rest, a stage that can make the picture truer (`Refining`)
-may ask for another round: what there is so far is published, and the stages concerned run again.
+may ask for another round: what there is so far is published, the first before anybody is asked, and the
+stages concerned run again.
 """
 
 from __future__ import annotations
@@ -154,12 +155,17 @@ class Pipeline:
         self.mark(frame, changes)
         self.report, self.rounds = [], 0
         result = self._round(frame, job)
+        able = any(isinstance(stage, Refining) for stage in self.stages)
         while not frame.moving:
             self.current = len(self.stages) - 1
+            first = able and not self.rounds and self.report[-1].rebuilt
+            if first:
+                job.publish(result)  # to ask can take longer than the edit itself
             asking = self._asking(frame, job)
             if not asking:
                 break
-            job.publish(result)
+            if not first:
+                job.publish(result)
             self.rounds += 1
             try:
                 with job.unheard():

@@ -340,6 +340,21 @@ def test_rounds_go_on_until_the_stage_is_content_and_each_is_shown() -> None:
     assert bench.heard == []
 
 
+def test_the_first_picture_waits_for_no_question(monkeypatch: pytest.MonkeyPatch) -> None:
+    bench = Looked()
+    told: list[int] = []
+    real = bench.detail.again
+
+    def again(*given: Any) -> bool:
+        told.append(len(bench.heard))
+        return real(*given)
+
+    monkeypatch.setattr(bench.detail, "again", again)
+    assert bench.look() == bench.truth
+    assert told == [1, 1, 2, 3]
+    assert [picture[-1] for picture in bench.heard] == [0, 1, 2]
+
+
 def test_who_moves_waits_for_no_round() -> None:
     bench = Looked()
     assert bench.look(moving=True)[-1] == 0
