@@ -8,12 +8,14 @@ from __future__ import annotations
 
 import dataclasses
 import tempfile
-from collections.abc import Iterable
+import time
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
-from studio.bench import cuts_growth, cuts_keeping, cuts_paper, cuts_peers
+from studio.bench import cuts_growth, cuts_keeping, cuts_paper, cuts_peers, cuts_settled
 from studio.bench.cuts_cases import CASES, Case, State
 from studio.bench.cuts_measure import Editor, Errors, Measured, Shaded, Truth, fitting, measured
 from studio.bench.cuts_scenes import ENVIRONMENTS, NATIVE, Rooms, prefix_of
@@ -28,6 +30,8 @@ from studio_core.shading.offline import backend_params, scene_view
 
 BACKEND = "cuts"
 METHODS = {"": "exact", "paper/": "svc-vcf"}
+IN_PARTS = True  # --only and --growth
+FULL = "full"
 PEER_ERRORS = (0.05, 0.02, 0.01)
 
 
@@ -42,10 +46,11 @@ class Setup:
     edits: int = 20
     checks: int = 2
     peer_edits: int = 6
-    samples: tuple[int, ...] = (4, 16, 64)
+    peer_exact: int = 3
+    samples: tuple[int, ...] = (4, 16, 100)
     converged: int = 384
-    settles: int = 3
-    opens: int = 3
+    settles: int = 1
+    opens: int = 2
     paper: cuts_paper.Sizes = dataclasses.field(default_factory=cuts_paper.Sizes)
     growth: cuts_growth.Steps | None = dataclasses.field(default_factory=cuts_growth.Steps)
 
@@ -58,6 +63,7 @@ QUICK = Setup(
     edits=3,
     checks=1,
     peer_edits=2,
+    peer_exact=2,
     samples=(4, 16),
     converged=64,
     settles=1,
@@ -71,7 +77,11 @@ def run(report: Report, program: Headless) -> None:
     """The whole suite on the sample room."""
     from studio_core.project.store import load
 
-    measure(report, program, load(sample()).scene, QUICK if report.quick else Setup())
+    setup = QUICK if report.quick else Setup()
+    if report.growth != FULL:
+        few = cuts_growth.QUICK if report.growth == "quick" else None
+        setup = dataclasses.replace(setup, growth=few)
+    measure(report, program, load(sample()).scene, setup)
 
 
 def measure(report: Report, program: Headless, base: Scene, setup: Setup, backend: str | None = None) -> None:
@@ -97,6 +107,8 @@ class Suite:
         self.truth = Truth(reference, program.services, values)
         self.finer = Truth(reference, program.services, {**values, "quarters": True})
         self._peers: dict[tuple[str, str], cuts_peers.Peer] = {}
+        self._settled: dict[tuple[str, str, str, bool], Editor] = {}
+        self._traced: set[str] = set()
         self.known = param_infos(self.backend.Params)
         self.methods = {p: m for p, m in METHODS.items() if not p or "method" in self.known}
 
@@ -106,22 +118,37 @@ class Suite:
         still = [case for case in CASES if not case.name.startswith("move")]
         moves = [case for case in CASES if case.name.startswith("move") and self._can(case)]
         for cases in (still, moves):  # the truth traces again whenever something stands elsewhere
-            self._trace_all(cases)
             for prefix, method in self.methods.items():
                 editor = Editor(self.backend, self.services)
                 for environment in ENVIRONMENTS:
                     for case in cases:
-                        self._case(editor, case, environment, prefix, method)
-        self._equal_directions()
+                        name = f"{prefix}{prefix_of(environment)}{case.name}"
+                        self.part(name, partial(self._case, name, editor, case, environment, method, cases))
         for environment in ENVIRONMENTS:
-            for name in cuts_keeping.SETTLES:
-                cuts_keeping.settle(self, environment, name)
+            name = f"{prefix_of(environment)}all-directions"
+            self.part(name, partial(self._equal_directions, name, environment))
+        self._against_peers()
+        for environment in ENVIRONMENTS:
+            for settled in cuts_keeping.SETTLES:
+                name = f"{prefix_of(environment)}{settled}"
+                self.part(name, partial(cuts_keeping.settle, self, environment, settled))
         for prefix, method in self.methods.items():
-            cuts_keeping.opening(self, prefix, method)
+            self.part(f"{prefix}precompute", partial(cuts_keeping.opening, self, prefix, method))
         if "paper/" in self.methods:
-            cuts_paper.tables(self, self.setup.paper)
+            self.part("paper/table", partial(cuts_paper.tables, self, self.setup.paper))
         if self.setup.growth is not None:
             cuts_growth.run(self, self.setup.growth)
+
+    def part(self, name: str, work: Callable[[], object], kind: str = "") -> None:
+        """Measure a part if it was asked for by its name; its seconds are told, what was found is kept."""
+        if not self.report.wants(name):
+            return
+        started = time.perf_counter()
+        work()
+        seconds = time.perf_counter() - started
+        self.detail(name, **{f"seconds{kind.replace(' ', '_')}": round(seconds, 1)})
+        self.say(f"{name}{kind}: {seconds:.1f} s")
+        self.report.keep()
 
     # --- what the parts need --------------------------------------------------------------------------
 
@@ -143,6 +170,16 @@ class Suite:
             **values,
         }
         return backend_params(self.backend, fitting(self.backend, wanted))
+
+    def settled_editor(self, environment: str, case: Case, refined: bool) -> Editor:
+        """For edits with refined meshes or without; cases share one while only materials differ."""
+        alone = "" if case.name.startswith("brdf") else case.name
+        key = (environment, case.materials, alone)
+        if self._settled and next(iter(self._settled))[:3] != key:
+            self._settled = {}
+        if (*key, refined) not in self._settled:
+            self._settled[*key, refined] = Editor(self.backend, self.services)
+        return self._settled[*key, refined]
 
     def base(self, environment: str, materials: str) -> State:
         """The room as every path begins and ends."""
@@ -190,11 +227,17 @@ class Suite:
     def _can(self, case: Case) -> bool:
         return "everywhere" in self.known or not case.everywhere
 
+    def _asked_for(self, case: Case) -> bool:
+        names = (f"{p}{prefix_of(e)}{case.name}" for p in self.methods for e in ENVIRONMENTS)
+        return any(self.report.wants(name) for name in names)
+
     def _path(self, case: Case, environment: str, materials: str) -> list[State]:
         return case.path(self.base(environment, materials), self.setup.edits + 1, materials)
 
     def _trace_all(self, cases: Iterable[Case]) -> None:
-        """The truth of every state to be looked at, in the order that moves things least."""
+        """The truth of every state to be looked at, in the order that moves things least; once."""
+        cases = [case for case in cases if case.name not in self._traced and self._asked_for(case)]
+        self._traced |= {case.name for case in cases}
         wanted: dict[int, list[tuple[State, bool]]] = {}
         for environment in ENVIRONMENTS:
             for case in sorted(cases, key=lambda case: not case.everywhere):
@@ -202,21 +245,19 @@ class Suite:
                 for place in looked(len(path), self.setup.checks):
                     wanted.setdefault(place, []).append((path[place], case.everywhere))
         for place, states in wanted.items():
-            self.say(f"Reference: {len(states)} states of edit {place}")
+            self.say(f"reference of edit {place}: {len(states)} states")
             for state, everywhere in states:
                 self.truth(state, everywhere)
 
-    def _equal_directions(self) -> None:
+    def _equal_directions(self, name: str, environment: str) -> None:
         """What is left to be wrong in a sum over all S directions, against the brightest in four parts."""
-        for environment in ENVIRONMENTS:
-            self.say(f"{prefix_of(environment)}all-directions")
-            state = self.base(environment, "diffuse")
-            pair = (self.truth(state), self.finer(state))
-            self.errors(f"{prefix_of(environment)}all-directions", [pair], False)
+        state = self.base(environment, "diffuse")
+        self.errors(name, [(self.truth(state), self.finer(state))], False)
 
-    def _case(self, editor: Editor, case: Case, environment: str, prefix: str, method: str) -> None:
-        name = f"{prefix}{prefix_of(environment)}{case.name}"
-        self.say(name)
+    def _case(
+        self, name: str, editor: Editor, case: Case, environment: str, method: str, cases: Iterable[Case]
+    ) -> None:
+        self._trace_all(cases)
         params = self.params(method=method, everywhere=case.everywhere)
         path = self._path(case, environment, case.materials)
         places = looked(len(path), self.setup.checks)
@@ -224,8 +265,18 @@ class Suite:
         pairs = [(made, self.truth(state, case.everywhere)) for state, made in found.on_the_way]
         self.rows(name, found)
         self.errors(name, pairs, case.everywhere)
-        if not prefix:
-            self._against_peer(name, editor, case, environment, params)
+
+    def _against_peers(self) -> None:
+        """Material by material: what a picture has settled to serves all its cases."""
+        cases = sorted(
+            (case for case in CASES if not case.everywhere), key=lambda case: (case.materials, case.name)
+        )
+        for environment in ENVIRONMENTS:
+            for case in cases:
+                name = f"{prefix_of(environment)}{case.name}"
+                work = partial(cuts_settled.against_peer, self, name, case, environment)
+                self.part(name, work, " against Mitsuba")
+        self._settled = {}
 
     def rows(self, name: str, found: Measured) -> None:
         """Times, counts and threads of a case."""
@@ -256,23 +307,6 @@ class Suite:
             ("picture_rel_rmse", errors.picture),
         ):
             self.report.add(name, metric, value, "1")
-
-    def _against_peer(self, name: str, editor: Editor, case: Case, environment: str, params: Any) -> None:
-        """The same edits in materials that Mitsuba has, and what it takes to the error at their end."""
-        materials = NATIVE[case.materials]
-        peer = self.peer(environment, materials)
-        if peer is None:
-            return
-        path = case.path(self.base(environment, materials), self.setup.peer_edits + 1, materials)
-        found = measured(editor, path, case.moving, params, self.program.registry, ())
-        self.compare(name, "peer_picture_rel_rmse", peer, found.last, found.timing("seconds").median)
-
-    def compare(self, name: str, metric: str, peer: cuts_peers.Peer, linear: Any, seconds: float) -> None:
-        """Our error against Mitsuba's converged picture, and its time to that error over ours."""
-        error = peer.error(linear)
-        self.report.add(name, metric, error, "1", peer.noise)
-        if error > 0 and peer.law.exponent < 0:  # else too few samples to tell
-            self.report.add(name, "peer_ratio", peer.ratio(error, seconds), "1")
 
 
 def looked(length: int, checks: int) -> set[int]:

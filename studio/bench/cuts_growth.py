@@ -1,7 +1,7 @@
 """How time and memory of `lucarne bench cuts` grow: with vertices, with objects, with directions.
 
 Each quantity is fitted by a power law; `…_exponent` is what it grows by (1: in proportion). Rows of single
-places are named growth/KIND/SIZE.
+places are named growth/KIND/SIZE. Opening is timed once, and so is the one edit of each kind at the largest.
 """
 
 from __future__ import annotations
@@ -9,6 +9,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from studio.bench.cuts_cases import Path, State, drags, sliders
@@ -32,8 +33,13 @@ class Steps:
 
     vertices: tuple[int, ...] = (3000, 10_000, 30_000, 100_000, 300_000)
     objects: tuple[int, ...] = (1, 2, FEW, 16, MANY)
-    directions: tuple[int, ...] = (10, 11, 12, 13, 14, 15, 16, 17)
-    edits: int = 5
+    directions: tuple[int, ...] = (10, 12, 14, 15, 16, 17)
+    edits: int = 3
+
+
+QUICK = Steps((3000, 10_000, 30_000, 100_000), (FEW, MANY), (11, 13, 15), 2)
+LARGE_VERTICES, LARGE_LEVEL = 100_000, 15
+"""Beyond, one edit is timed."""
 
 
 def run(suite: Suite, steps: Steps) -> None:
@@ -41,10 +47,12 @@ def run(suite: Suite, steps: Steps) -> None:
     room = suite.base("windows", "glossy")
 
     def at_vertices(size: int) -> dict[str, float]:
-        return place(suite, room, suite.params(vertices=size), steps.edits)
+        edits = steps.edits if size <= LARGE_VERTICES else 1
+        return place(suite, room, suite.params(vertices=size), edits)
 
     def at_directions(level: int) -> dict[str, float]:
-        return place(suite, room, suite.params(directions=str(1 << level)), steps.edits)
+        edits = steps.edits if level <= LARGE_LEVEL else 1
+        return place(suite, room, suite.params(directions=str(1 << level)), edits)
 
     def at_objects(count: int) -> dict[str, float]:
         scene = hall(count, next(room.scene.of(Environment)).image)
@@ -70,17 +78,22 @@ def grow(
     suite: Suite, kind: str, sizes: Sequence[int], at: Callable[[int], dict[str, float]]
 ) -> dict[int, dict[str, float]]:
     """Measure at each size and fit; what was found by size."""
-    found = {}
-    for size in sizes:
-        suite.say(f"growth/{kind}/{size}")
+    found: dict[int, dict[str, float]] = {}
+
+    def measure(name: str, size: int) -> None:
         found[size] = at(size)
         for metric, value in found[size].items():
-            suite.report.add(f"growth/{kind}/{size}", metric, value, METRICS.get(metric, "1"))
+            suite.report.add(name, metric, value, METRICS.get(metric, "1"))
+
+    for size in sizes:
+        name = f"growth/{kind}/{size}"
+        suite.part(name, partial(measure, name, size))
     for metric in METRICS:
         pairs = [(size, values[metric]) for size, values in found.items() if values.get(metric, 0) > 0]
         if len(pairs) > 1:
             law = PowerLaw.fit(*zip(*pairs, strict=True))
             suite.report.add(f"growth/{kind}", f"{metric}_exponent", law.exponent, "1", law.misfit)
+    suite.report.keep()
     return found
 
 

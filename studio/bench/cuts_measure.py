@@ -6,6 +6,7 @@ An `Editor` holds one pipeline and goes from state to state by the difference of
 
 from __future__ import annotations
 
+import contextlib
 import time
 from collections.abc import Container, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -17,7 +18,7 @@ import numpy.typing as npt
 from studio.bench.cuts_cases import State
 from studio.bench.harness import Timing, relative_p99, relative_rmse
 from studio_core.contract import Registry, Services, ShadingBackend
-from studio_core.errors import LucarneError
+from studio_core.errors import Cancelled, LucarneError
 from studio_core.params import param_infos
 from studio_core.raster import PictureStage
 from studio_core.scene.diff import Aspect, Changes, diff, view_changed
@@ -57,35 +58,60 @@ class Editor:
         self.backend = backend
         self.pipeline = Pipeline([*backend.stages(services), PictureStage(services)])
         self.frame: Frame | None = None
+        self.shown: list[tuple[float, F32]] = []
 
     def go(self, state: State, params: Any, moving: bool, listening: bool = True) -> tuple[Step, Picture]:
-        """Shade `state` after whatever came before; `listening` shows what is published meanwhile."""
-        before = self.frame
-        revision = 1 if before is None else before.revision + 1
-        frame = Frame(state.scene, state.view, params, revision, moving)
-        first: list[float] = []
-        seen = (lambda _: first.append(time.perf_counter())) if listening else None
+        """Shade `state` after whatever came before; `listening` shows what is published meanwhile.
+
+        `shown` then holds the pictures of this frame, each with its seconds.
+        """
+        shown: list[tuple[float, F32]] = []
+        seen = (lambda made: shown.append((time.perf_counter(), made.linear))) if listening else None
         job = Job("bench", on_publish=seen)
         started = time.perf_counter()
-        changes = Changes() if before is None else changed(before, frame)
+        frame, changes = self._next(state, params, moving)
         picture: Picture = self.pipeline.update(frame, changes, job)
         ended = time.perf_counter()
-        self.frame = frame
+        shown = [*shown, (ended, picture.linear)]
+        self.shown = [(at - started, linear) for at, linear in shown]
         stages: dict[str, float] = {}
         for run in self.pipeline.report:  # a stage may run in several rounds
             stages[run.name] = stages.get(run.name, 0.0) + run.seconds
         gives = {type(stage).__name__: stage.gives for stage in self.pipeline.stages}
         primary = sum(taken for name, taken in stages.items() if gives.get(name) is Hits)
         compose = sum(taken for name, taken in stages.items() if gives.get(name) is Picture)
-        shown = min([*first, ended]) - started
-        step = Step(ended - started, shown, primary, compose, stages, dict(picture.radiance.counts))
-        return step, picture
+        counts = dict(picture.radiance.counts)
+        return Step(ended - started, self.shown[0][0], primary, compose, stages, counts), picture
+
+    def first_exact(self, state: State, params: Any) -> tuple[float, Picture]:
+        """Seconds at rest until the first exact picture, and that; what would refine it is cancelled."""
+        found: list[tuple[float, Picture]] = []
+
+        def look(picture: Picture) -> None:
+            if picture.radiance.final and not found:
+                found.append((time.perf_counter(), picture))
+                job.cancel()
+
+        job = Job("bench", on_publish=look)
+        started = time.perf_counter()
+        frame, changes = self._next(state, params, moving=False)
+        with contextlib.suppress(Cancelled):
+            look(self.pipeline.update(frame, changes, job))
+        ended, picture = found[0]
+        return ended - started, picture
+
+    def _next(self, state: State, params: Any, moving: bool) -> tuple[Frame, Changes]:
+        """The frame of a state after the last, and what differs; it counts from now on."""
+        before = self.frame
+        revision = 1 if before is None else before.revision + 1
+        self.frame = Frame(state.scene, state.view, params, revision, moving)
+        return self.frame, Changes() if before is None else changed(before, self.frame)
 
 
 def changed(before: Frame, after: Frame) -> Changes:
     """What a window would say differs between two frames."""
     changes = diff(before.scene, after.scene)
-    if before.view != after.view or not after.moving:
+    if before.view != after.view or (before.moving and not after.moving):
         changes |= view_changed()
     if before.params != after.params:
         changes |= view_changed(Aspect.QUALITY)

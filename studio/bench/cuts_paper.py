@@ -43,7 +43,6 @@ def tables(suite: Suite, sizes: Sizes) -> None:
     from studio_plugins.cuts.paper.settings import PaperParams
     from studio_plugins.cuts.paper.table import shell_rows, size_rows, whole_fields
 
-    suite.say("paper/table")
     services, workers, job = suite.services, suite.services.workers, Job("bench")
     pipeline = Pipeline(common_stages(services))
     base = suite.base("windows", "diffuse")
@@ -73,7 +72,6 @@ def tables(suite: Suite, sizes: Sizes) -> None:
         suite.report.add("paper/table", slug(row.what), row.ours, row.unit.replace("bytes", "B") or "1")
         said[slug(row.what)] = row.paper
     suite.detail("paper/table", paper=said, directions=1 << k)
-    suite.say("paper/shells")
     points = some(sizes.points)
     for field in shell_rows(
         surfaces.mesh, casters.shadow, casters.meshes, points, tree, workers, params, sizes.shells, job

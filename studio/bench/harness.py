@@ -13,6 +13,7 @@ import subprocess
 import time
 from collections.abc import Callable, Iterable
 from dataclasses import asdict, dataclass, field
+from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any
 
@@ -34,10 +35,17 @@ class Row:
 
 @dataclass
 class Report:
-    """The rows of one run of a suite."""
+    """The rows of one run of a suite, and which it shall have.
+
+    only: patterns of case names (as in a shell, with commas between), growth: `full`, `quick` or `none`, both
+    for suites that have such parts; target: where `keep` writes what there is so far.
+    """
 
     suite: str
     quick: bool
+    only: str = "*"
+    growth: str = "full"
+    target: Path | None = None
     rows: list[Row] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
     details: dict[str, Any] = field(default_factory=dict)  # by case; in the JSON alone
@@ -45,6 +53,10 @@ class Report:
     def add(self, case: str, metric: str, value: float, unit: str, spread: float = 0.0) -> None:
         """One more figure."""
         self.rows.append(Row(case, metric, float(value), unit, float(spread)))
+
+    def wants(self, case: str) -> bool:
+        """Whether a case is one of those that were asked for."""
+        return any(fnmatchcase(case, pattern.strip()) for pattern in self.only.split(","))
 
     def as_dict(self) -> dict[str, Any]:
         """What is written as JSON."""
@@ -58,6 +70,13 @@ class Report:
             "notes": self.notes,
             "details": self.details,
         }
+
+    def keep(self) -> None:
+        """Write what there is so far, if anything, in place of what was written before."""
+        if self.target is not None and self.rows:
+            beside = self.target.with_name(f".{self.target.name}.part")
+            self.write(beside)
+            beside.replace(self.target)
 
     def write(self, path: Path) -> None:
         """JSON, stable in order."""

@@ -14,20 +14,23 @@ import pytest
 from scenes import little_scene, sky
 
 from studio.bench import cuts, cuts_growth, cuts_paper, cuts_peers
-from studio.bench.cuts_cases import CASES, CHAIR, ONE, Case, State, orbits, turns
+from studio.bench.cuts_cases import CASES, CHAIR, ONE, Case, State, orbits, sliders, turns
 from studio.bench.cuts_keeping import SETTLES
-from studio.bench.cuts_measure import Errors, Shaded, changed, kept_bytes
+from studio.bench.cuts_measure import Editor, Errors, Shaded, changed, kept_bytes
 from studio.bench.cuts_scenes import NATIVE, Rooms, hall, painted, with_sun
+from studio.bench.cuts_settled import points
 from studio.bench.harness import Report, relative_rmse
 from studio.headless import Headless
+from studio_core.contract import Services
 from studio_core.errors import LucarneError
 from studio_core.imaging.latlong import pixel_solid_angles
+from studio_core.parallel import Workers
 from studio_core.params import param
 from studio_core.registry import PluginHost
 from studio_core.scene.diff import Aspect, diff
 from studio_core.scene.nodes import Environment, MeshObject, Scene
 from studio_core.shading.frame import Frame
-from studio_core.shading.offline import scene_view
+from studio_core.shading.offline import backend_params, scene_view
 from studio_plugins.export import mitsuba_run
 from studio_plugins.reference.backend import BACKEND as REFERENCE
 from studio_plugins.reference.backend import Params as ReferenceParams
@@ -243,7 +246,7 @@ def test_kept_bytes_count_every_array_once() -> None:
 
 def test_growth_is_fitted(capsys: pytest.CaptureFixture[str]) -> None:
     report = Report("cuts", False)
-    suite: Any = SimpleNamespace(say=lambda text: None, report=report)
+    suite: Any = SimpleNamespace(part=lambda name, work: work(), report=report)
     cuts_growth.grow(
         suite, "vertices", [10, 100, 1000], lambda n: {"brdf_ms": 0.5 * n, "exact_ms": n**1.5, "bytes": 0.0}
     )
@@ -310,7 +313,7 @@ def test_converged_pictures_are_kept_by_content(noisy: type[Noisy]) -> None:
         before = noisy.calls
         cuts_peers.peer(wanted, program, (4,), 128)
         calls.append(noisy.calls - before)
-    assert calls == [6, 2, 6, 6]
+    assert calls == [5, 1, 5, 5]
 
 
 # --- all of it ----------------------------------------------------------------------------------------
@@ -347,6 +350,7 @@ TINY = cuts.Setup(
     edits=2,
     checks=1,
     peer_edits=2,
+    peer_exact=2,
     samples=(1, 4),
     converged=16,
     settles=1,
@@ -392,7 +396,12 @@ def test_the_suite_has_every_promised_row(monkeypatch: pytest.MonkeyPatch, noisy
                 assert found[name, "picture_rel_rmse"] < 1e-4, name
                 assert found[name, "threads"] == 2
                 assert found[name, "picture_ms"] >= found[name, "compose_ms"] > 0
-                assert ("peer_picture_rel_rmse" in metrics) == (paper == "")
+                compared = not paper and not case.everywhere
+                assert ("peer_picture_rel_rmse" in metrics) == compared
+                for point in points(case) if compared else ():
+                    assert found[name, f"peer_{point.name}_ms"] > 0
+                    assert found[name, "peer_ratio"] >= found[name, f"peer_{point.name}_ratio"] > 0
+                assert report.details[name]["seconds"] >= 0
                 assert len(report.details[name]["ms"]) == TINY.edits
         assert found[f"{sun}all-directions", "irradiance_rel_rmse"] < 0.01  # a smooth sky
         for case in SETTLES:
@@ -411,6 +420,39 @@ def test_the_suite_has_every_promised_row(monkeypatch: pytest.MonkeyPatch, noisy
     said = report.details["paper/table"]["paper"]
     assert said["svc_and_vcf_with_heights_whole_fields"] == 270e6
     assert {f"growth/{kind}" for kind in ("vertices", "objects", "directions")} <= {case for case, _ in found}
+
+
+def test_a_part_that_was_not_asked_for_is_not_measured_and_what_is_done_is_kept(tmp_path: Path) -> None:
+    report, program = (
+        Report("cuts", True, only="brdf*,sun/*", target=tmp_path / "r.json"),
+        Headless(quiet=True),
+    )
+    try:
+        suite = cuts.Suite(report, program, room(), TINY, tmp_path, "reference")
+        done = []
+        for name in ("brdf-one", "camera", "sun/camera", "paper/brdf"):
+            suite.part(name, lambda name=name: (done.append(name), report.add(name, "ms", 1, "ms")))  # type: ignore[misc]
+        with pytest.raises(ZeroDivisionError):
+            suite.part("brdf-sharp", lambda: 1 / 0)
+    finally:
+        program.close()
+    assert done == ["brdf-one", "sun/camera"]
+    assert [row["case"] for row in json.loads((tmp_path / "r.json").read_text())["rows"]] == done
+
+
+def test_the_first_exact_picture_at_rest_is_that_of_the_whole_edit(host: PluginHost) -> None:
+    base = state(painted(room(), "diffuse"))
+    editor, other = (Editor(REFERENCE, Services(Workers(2), host)) for _ in range(2))
+    params = backend_params(REFERENCE, {"vertices": 600, "directions": "1024"})
+    _, first = editor.go(base, params, moving=False)
+    assert [linear is first.linear for _, linear in editor.shown][-1]
+    (step,) = sliders(base, 2, "diffuse")[:1]
+    seconds, picture = editor.first_exact(step, params)
+    assert seconds > 0
+    _, expected = other.go(step, params, moving=False)
+    np.testing.assert_allclose(picture.linear, expected.linear, atol=1e-6)
+    _, again = editor.go(base, params, moving=False)  # what was cut short is not forgotten
+    np.testing.assert_allclose(again.linear, first.linear, atol=1e-6)
 
 
 @pytest.mark.slow

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import argparse
 import json
 import re
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -25,9 +27,11 @@ from studio.bench.harness import (
     timed,
     unbiased_rmse,
 )
-from studio.bench.run import SUITES
+from studio.bench.run import SUITES, run
 from studio.cli import main
+from studio.headless import Headless
 from studio_core import __version__
+from studio_core.errors import InputError
 
 positive = st.floats(1e-3, 1e3)
 
@@ -188,3 +192,76 @@ def test_bench_runs_a_suite_prints_its_table_and_writes_its_rows(
 def test_every_suite_of_bench_is_there() -> None:
     for where in SUITES["bench"].values():
         assert Path(harness.__file__).with_name(f"{where.rpartition('.')[2]}.py").is_file()
+
+
+# --- runs in parts ------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("only", "case", "wanted"),
+    [
+        ("*", "sun/brdf", True),
+        ("brdf", "brdf", True),
+        ("brdf", "brdf-one", False),
+        ("sun/*, settle*", "settle-own", True),
+        ("sun/*, settle*", "sun/camera", True),
+        ("sun/*, settle*", "paper/sun/camera", False),
+    ],
+)
+def test_cases_are_chosen_by_patterns(only: str, case: str, wanted: bool) -> None:
+    assert Report("little", False, only=only).wants(case) is wanted
+
+
+def test_what_there_is_so_far_replaces_what_was_written(tmp_path: Path) -> None:
+    target = tmp_path / "rows.json"
+    target.write_text("of yesterday")
+    made = Report("little", False, target=target)
+    made.keep()
+    assert target.read_text() == "of yesterday"  # nothing is there to take its place
+    made.add("sample", "error", 1, "1")
+    made.keep()
+    made.add("sample", "seconds", 2, "s")
+    assert len(json.loads(target.read_text())["rows"]) == 1
+    made.keep()
+    assert len(json.loads(target.read_text())["rows"]) == 2
+    assert [path.name for path in tmp_path.iterdir()] == ["rows.json"]
+
+
+class Suite:
+    """Stands in for a module; is interrupted after one row."""
+
+    IN_PARTS = False
+
+    @staticmethod
+    def run(report: Report, program: object) -> None:
+        report.add("sample", "error", 1, "1")
+        raise KeyboardInterrupt
+
+
+def asked(tmp_path: Path, **other: str) -> argparse.Namespace:
+    values = {"only": "*", "growth": "full", **other}
+    return argparse.Namespace(verb="bench", name="little", quick=True, json=tmp_path / "rows.json", **values)
+
+
+@pytest.fixture
+def little(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(SUITES["bench"], "little", "little_suite")
+    monkeypatch.setitem(sys.modules, "little_suite", Suite)
+
+
+@pytest.mark.usefixtures("little")
+def test_an_interrupted_run_keeps_and_shows_its_rows(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(KeyboardInterrupt):
+        run(asked(tmp_path), Headless(quiet=True))
+    assert "| sample | error | 1 |" in capsys.readouterr().out
+    assert json.loads((tmp_path / "rows.json").read_text())["rows"][0]["case"] == "sample"
+
+
+@pytest.mark.usefixtures("little")
+@pytest.mark.parametrize("other", [{"only": "brdf"}, {"growth": "none"}])
+def test_a_suite_without_parts_says_so(tmp_path: Path, other: dict[str, str]) -> None:
+    with pytest.raises(InputError, match="bench little has no parts"):
+        run(asked(tmp_path, **other), Headless(quiet=True))
+    assert not (tmp_path / "rows.json").exists()
