@@ -1,4 +1,4 @@
-"""Where hits on a mesh lie after it was refined, what old vertices tell of new ones, and what faces miss."""
+"""Where hits on a mesh lie after it was refined, which vertices new ones lie between, and what faces miss."""
 
 from __future__ import annotations
 
@@ -69,18 +69,6 @@ def descend(between: I64, wanted: Bools) -> None:
             wanted[i] = False
             wanted[between[i, 0]] = True
             wanted[between[i, 1]] = True
-
-
-@kernel
-def prolong(between: I64, known: Bools, values: F32) -> None:
-    """Values (V, C) of vertices that refinement made and that are not known: the means of those between.
-
-    With all that `descend` left, it gives what the unrefined mesh would show.
-    """
-    for i in range(len(between)):
-        if not known[i] and between[i, 0] != between[i, 1]:
-            for c in range(values.shape[1]):
-                values[i, c] = np.float32(0.5) * (values[between[i, 0], c] + values[between[i, 1], c])
 
 
 @kernel

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import hashlib
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -15,14 +16,14 @@ from studio_core.scene.bisection import longest, split
 from studio_core.scene.geometry import Geometry
 from studio_core.scene.normals import NONE, Fan, fan
 from studio_core.scene.surface import surface
-from studio_core.scene.tessellate import Estimate, subdivide
+from studio_core.scene.tessellate import SLACK, Estimate, subdivide
 from studio_core.scene.topology import Floats, Ints, edges, ranks
 
 CREASE_DEGREES = 40.0  # between the 36° of a ten-sided column and the 45° of a chamfer
 BUDGET = 30_000
 LIMIT = 2_000_000
 INSET = 1e-3
-EDGE_STEPS = 16
+LADDER = 2  # edges to an octave
 NO_BACK = 0xFFFFFFFF
 
 F32 = npt.NDArray[np.float32]
@@ -108,7 +109,8 @@ def shade_mesh(
     base = prepared or prepare(geometry, crease_degrees)
     expected = Estimate(base)
     if expected.longest > 0:
-        edge = min(max(edge, expected.longest / 2**20), 2 * expected.longest)
+        whole = edge * (1 - SLACK) >= expected.longest  # nothing is split: one mesh, whatever was asked for
+        edge = 2 * expected.longest if whole else max(edge, expected.longest / 2**20)
     while edge < expected.longest and (count := expected.at(edge)) > max(limit, expected.vertices):
         edge *= max(1.02, math.sqrt(count / limit))
     return _finished(_in_order(subdivide(base, edge)), edge, geometry.uvs is not None)
@@ -275,9 +277,8 @@ def choose_edge(
 
     Where the sources alone take more than three quarters of the budget, a quarter of it is still given to
     splitting: a floor of two triangles beside one heavy armchair is not left unshaded. The estimate of each
-    geometry is corrected once by splitting it. The edge is rounded up to a sixteenth of an octave, so that
-    most small additions to a scene leave the other meshes as they are. 1.0 without objects. Raises
-    ValueError when the budget is under 1.
+    geometry is corrected once by splitting it. 1.0 without objects. Raises ValueError when the budget is
+    under 1. What each object gets is the `rung` next to it.
     """
     if budget < 1:
         raise ValueError("the vertex budget must be positive")
@@ -296,7 +297,9 @@ def choose_edge(
         made = 0.0
         for key, scale in uses:
             least = expected[key].vertices
-            made += least + factor[key] * (expected[key].at(edge / scale) - least)
+            made += least
+            if edge < scale * expected[key].longest:
+                made += factor[key] * (expected[key].at(edge / scale) - least)
         return made
 
     chosen = _largest_within(total, largest, allowed)
@@ -305,8 +308,18 @@ def choose_edge(
         guess = expected[key].at(edge) - expected[key].vertices
         if guess > 0.02 * allowed:
             factor[key] = (len(subdivide(bases[key], edge).weld) - expected[key].vertices) / guess
-    chosen = _largest_within(total, largest, allowed)
-    return float(2 ** (math.ceil(EDGE_STEPS * math.log2(chosen)) / EDGE_STEPS))
+    return _largest_within(total, largest, allowed)
+
+
+def rung(geometry: Geometry, edge: float) -> float:
+    """The edge nearest to `edge` (own frame) on the geometry's ladder, whose rungs are a factor of √2 apart.
+
+    So an object keeps its mesh while a scene grows and shrinks a little, and what it gets depends on the
+    scene alone, not on how it came to be. Every geometry has its ladder somewhere else: where a scene grows
+    much, objects are split anew one by one, and together they take what `choose_edge` reckoned with.
+    """
+    place = int.from_bytes(hashlib.sha256(geometry.key.encode()).digest()[:4], "big") / 2**32
+    return float(2 ** ((round(LADDER * math.log2(edge) - place) + place) / LADDER))
 
 
 def _largest_within(total: Callable[[float], float], largest: float, allowed: float) -> float:

@@ -32,6 +32,7 @@ class MeshCache:
         self._capacity = capacity
         self._crease = crease_degrees
         self._held: OrderedDict[tuple[str, float], Fan | ShadingMesh] = OrderedDict()
+        self._made: dict[tuple[str, float], tuple[str, float]] = {}  # what was asked for, and what is held
 
     def prepared(self, geometry: Geometry) -> Fan:
         """The repaired source; `choose_edge` takes this method."""
@@ -43,12 +44,18 @@ class MeshCache:
         return found
 
     def mesh(self, geometry: Geometry, edge: float) -> ShadingMesh:
-        """The shading mesh at a target edge in the geometry's own frame, four digits of it."""
-        edge = float(f"{edge:.4g}")
-        key = (geometry.key, edge)
+        """The shading mesh at a target edge in the geometry's own frame, four digits of it.
+
+        Edges that come to the same, where nothing is split, give the same object.
+        """
+        asked = (geometry.key, float(f"{edge:.4g}"))
+        key = self._made.get(asked, asked)
         found = self._held.get(key)
         if not isinstance(found, ShadingMesh):
-            found = shade_mesh(geometry, edge, prepared=self.prepared(geometry))
+            made = shade_mesh(geometry, asked[1], prepared=self.prepared(geometry))
+            key = self._made[asked] = (geometry.key, made.edge)
+            same = self._held.get(key)
+            found = same if isinstance(same, ShadingMesh) else made
         self._keep(key, found)
         return found
 

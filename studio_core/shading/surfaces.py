@@ -15,8 +15,8 @@ from studio_core.params import param
 from studio_core.scene.bounds import scene_bounds
 from studio_core.scene.diff import Aspect
 from studio_core.scene.nodes import MaterialId, MeshObject, Scene
-from studio_core.scene.shading_mesh import BUDGET, choose_edge
-from studio_core.scene.world_mesh import MeshCache, world_mesh
+from studio_core.scene.shading_mesh import BUDGET, choose_edge, rung
+from studio_core.scene.world_mesh import MeshCache, Placed, assemble
 from studio_core.shading.artifacts import Casters, Source, Surfaces
 from studio_core.shading.frame import Frame
 from studio_core.shading.job import Job
@@ -77,7 +77,15 @@ class SurfaceStage:
         sizes = [(geometry, world.scale) for _, geometry, world, _ in items]
         edge = choose_edge(sizes, budget, prepared=self._cache.prepared)
         low, high = scene_bounds(scene)
-        mesh = world_mesh(items, edge, origin=np.round((low + high) / 2), cache=self._cache)
+        mesh = assemble(
+            [
+                Placed(
+                    node, self._cache.mesh(geometry, rung(geometry, edge / world.scale)), world, tuple(slots)
+                )
+                for node, geometry, world, slots in items
+            ],
+            origin=np.round((low + high) / 2),
+        )
         return Surfaces(sources, tuple(table), mesh, _opacity(scene, table), budget)
 
 

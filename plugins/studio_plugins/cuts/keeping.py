@@ -38,7 +38,7 @@ def load(cache: DiskCache, store: VisibilityStore, surfaces: Surfaces, occluders
     found = cache.get(METHOD, *key_of(store.k, surfaces, occluders))
     if found is None or not {"pool", "length"} <= found.keys():
         return False
-    return store.unpack(unrefined_rows(surfaces), found["pool"], found["length"].astype(np.int32))
+    return store.unpack(unrefined_rows(surfaces), found["pool"], found["length"])
 
 
 def save(cache: DiskCache, store: VisibilityStore, surfaces: Surfaces, occluders: Occluders) -> int:

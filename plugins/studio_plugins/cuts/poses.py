@@ -41,7 +41,24 @@ class Poses:
 
     def same(self, then: Poses, slots: I64) -> bool:
         """Whether the objects, those of `slots`, are the same as then and nothing is stale."""
-        return len(self.scale) == len(then.scale) and not stale(then, self, slots).any()
+        return len(self.scale) == len(then.scale) and self.hold(then, slots)
+
+    def hold(self, then: Poses, slots: I64) -> bool:
+        """Whether nothing is `stale`: all objects of `slots` were there, and have moved as one if at all."""
+        if not len(slots):
+            return True
+        there = slots[slots < len(then.row)]
+        rows = then.row[there]
+        if len(there) < len(slots) or (rows < 0).any():
+            return False
+        mine = self.row[slots]
+        moved = self.place[mine] - then.place[rows]
+        apart = (moved.max(axis=0) - moved.min(axis=0)).max()
+        if apart > _SAME * (1 + np.abs(moved).max()):
+            return False
+        turned = np.abs(then.turn[rows] - self.turn[mine]).max() > _SAME
+        sized = np.abs(then.scale[rows] / self.scale[mine] - 1).max() > _SAME
+        return not turned and (not sized or len(slots) == 1)
 
 
 def stale(then: Poses, now: Poses, slots: I64) -> Bools:

@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from studio_plugins.cuts.intervals import gather_records, record_type
+from studio_core.jit import kernel
+from studio_plugins.cuts.intervals import Pool, gather_records, record_type
 
 I32 = npt.NDArray[np.int32]
 I64 = npt.NDArray[np.int64]
@@ -84,3 +85,36 @@ class Records:
         gather_records(self.pool, self.start, self.length, target[:-1], pool)
         self.start = target[:-1].copy()
         self.pool, self.used = pool, live
+
+
+@kernel
+def mentioning(pool: Pool, start: I64, length: I32, slots: Bools) -> Bools:
+    """(V,) whether a record has a segment of one of the slots (n,)."""
+    made = np.zeros(len(start), np.bool_)
+    for row in range(len(start)):
+        at, end = start[row], start[row] + length[row]
+        while at < end:
+            if slots[pool[at]]:
+                made[row] = True
+                break
+            at += 2 + 2 * int(pool[at + 1])
+    return made
+
+
+@kernel
+def readable(pool: Pool, length: I32, slots: int, leaves: int) -> bool:
+    """Whether these are records, one after the other, of so many slots and leaves."""
+    at = 0
+    for row in range(len(length)):
+        end = at + length[row]
+        if length[row] < 2 or end > len(pool):
+            return False
+        while at < end:
+            if at + 2 > end or pool[at] >= slots or at + 2 + 2 * int(pool[at + 1]) > end:
+                return False
+            after = at + 2 + 2 * int(pool[at + 1])
+            for pair in range(at + 2, after, 2):
+                if pool[pair] > pool[pair + 1] or pool[pair + 1] >= leaves:
+                    return False
+            at = after
+    return at == len(pool)

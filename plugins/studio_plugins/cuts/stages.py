@@ -104,7 +104,7 @@ class VisibilityStage:
         if self._store is None or self._store.k != k or self._store.full:
             self._store = VisibilityStore(k, self._workers)
         store = self._store
-        generation = store.generation
+        generation, before = store.generation, store.stamp
         occluders = self._occluders(frame.scene, surfaces, inputs[Casters])
         store.follow(surfaces, occluders)
         if frame.params.everywhere:
@@ -112,7 +112,6 @@ class VisibilityStage:
         else:
             mask = visible_vertices(surfaces, hits)
         points = np.flatnonzero(mask)
-        before = store.stamp
         self._asked = surfaces, occluders
         if frame.params.method != EXACT:
             return self._unless_same(inputs.previous, Seen(store, points, mask, True, k), generation, before)

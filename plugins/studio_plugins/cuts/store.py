@@ -24,7 +24,8 @@ from studio_plugins.cuts.guides import packets_around
 from studio_plugins.cuts.intervals import gather_records, relabel
 from studio_plugins.cuts.occluders import Occluders
 from studio_plugins.cuts.poses import Poses, stale
-from studio_plugins.cuts.records import NEVER, Records
+from studio_plugins.cuts.records import NEVER, Records, mentioning, readable
+from studio_plugins.cuts.shelf import Shelf, common
 from studio_plugins.cuts.tracer import (
     COUNTS,
     GUESSED,
@@ -93,6 +94,8 @@ class VisibilityStore:
         self._slots: I64 = np.zeros(0, np.int64)
         self._alive: Bools = np.zeros(1, np.bool_)
         self._poses: dict[int, Poses] = {}
+        self._holds: Bools = np.zeros(2, np.bool_)  # by epoch: whether all that it tells is as now
+        self._shelf = Shelf()
         self._now = 0
         self._meshes: dict[NodeId, tuple[ShadingMesh, slice]] = {}
         self._surfaces: Surfaces | None = None
@@ -108,23 +111,26 @@ class VisibilityStore:
         keys = occluders.keys
         slots = np.array([self._slot_of.setdefault(key, len(self._slot_of)) for key in keys], np.int64)
         self._renumber(surfaces)
-        back = slots[slots < len(self._alive)]
-        same = np.isin(self._slots, slots).all() and self._alive[back].all()
-        if len(self._slots) and not same:  # what is gone hides nothing any more, what is back does again
-            self.stamp += 1
-            self.exact.stamp[self.exact.stamp > 0] = self.stamp
-            self._forget_coarse()
-        self._slots = slots
-        self._alive = np.zeros(max(len(self._slot_of), 1), np.bool_)
-        self._alive[slots] = True
+        alive = np.zeros(max(len(self._slot_of), 1), np.bool_)
+        alive[slots] = True
+        other = alive.copy()
+        other[: len(self._alive)] ^= self._alive
+        if other[: len(self._alive)].any():  # what is gone hides nothing any more, what is back does again
+            told = mentioning(self.exact.pool, self.exact.start, self.exact.length, other)
+            self.stamp += bool(told.any())
+            self.exact.stamp[told] = self.stamp
+        self._slots, self._alive = slots, alive
         poses = Poses.of(occluders.transforms, slots, len(self._alive))
         known = self._poses.get(self._now)
         if known is None or not poses.same(known, slots):
             self._now = max(self._poses, default=0) + 1
             self._poses[self._now] = poses
             self._forget_coarse()
-        in_use = {int(epoch) for epoch in np.unique(self.exact.epoch)} | {self._now}
+        in_use = {int(epoch) for epoch in np.unique(self.exact.epoch)} | self._shelf.epochs | {self._now}
         self._poses = {epoch: kept for epoch, kept in self._poses.items() if epoch in in_use}
+        self._holds = np.zeros(self._now + 2, np.bool_)  # the last is that of NEVER
+        for epoch, kept in self._poses.items():
+            self._holds[epoch] = poses.hold(kept, slots)
         self._surfaces, self._occluders = surfaces, occluders
         self._owner = occluders.of[surfaces.mesh.object]
 
@@ -140,13 +146,20 @@ class VisibilityStore:
         if same and len(self.exact) == len(mesh):
             return
         self.gone_to = np.full(len(self.exact), -1, np.int64)
-        for node, (shape, there) in meshes.items():
-            if node in self._meshes:
-                before, old = self._meshes[node]
-                kept = _common(before, shape)
+        stay = set()
+        for node, (before, old) in self._meshes.items():
+            shape, there = meshes.get(node, (None, old))
+            kept = common(before, shape) if shape is not None else 0
+            if kept:
                 self.gone_to[old.start : old.start + kept] = np.arange(there.start, there.start + kept)
+                stay.add(node)
+            else:
+                self._shelf.put(node, before, self.exact, old)
         self.generation += 1
         self.exact.renumber(len(mesh), self.gone_to)
+        for node, (shape, there) in meshes.items():
+            if node not in stay and self._shelf.take(node, shape, self.exact, there.start, self.stamp + 1):
+                self.stamp += 1
         self._coarse = Records(self.k, len(mesh))
         self._forget_coarse()
         self._meshes = meshes
@@ -172,14 +185,11 @@ class VisibilityStore:
         return row.astype(np.int64), np.array(tables, np.bool_).reshape(-1, count, count)
 
     def unknown(self, points: Points) -> Points:
-        """Those of the points whose exact record has to be traced, wholly or in part."""
-        behind: Points = points[self.exact.epoch[points] != self._now]
-        if not len(behind):
-            return behind
-        row, table = self._stale(behind)
-        needed = np.asarray(table.any(axis=2))[row, self._owner[behind]]
-        self.exact.epoch[behind[~needed]] = self._now
-        made: Points = behind[needed]
+        """Those of the points whose exact record has to be traced, wholly or in part.
+
+        What holds of one thing's vertices holds of all: where any moved by itself, all see it elsewhere.
+        """
+        made: Points = points[~self._holds[self.exact.epoch[points]]]
         return made
 
     def unseen(self, points: Points) -> bool:
@@ -188,7 +198,7 @@ class VisibilityStore:
 
     def sources(self) -> Sources:
         """What to read for each vertex."""
-        usable = (self._coarse.epoch == self._now) & (self.exact.epoch != self._now)
+        usable = (self._coarse.epoch == self._now) & ~self.current
         skip = np.empty((1 + len(self._coarse_stale), len(self._slots), len(self._alive)), np.bool_)
         skip[:] = ~self._alive
         for row, table in enumerate(self._coarse_stale, 1):
@@ -220,7 +230,7 @@ class VisibilityStore:
     @property
     def current(self) -> Bools:
         """(V,) which vertices have an exact record of what is now."""
-        return np.asarray(self.exact.epoch == self._now)
+        return np.asarray(self._holds[self.exact.epoch])
 
     def summary(self) -> Mapping[str, int]:
         """Counts of work done and skipped since the store was made."""
@@ -241,7 +251,7 @@ class VisibilityStore:
 
         Raises ValueError where one of them is not known. What objects blocked that are gone is left out.
         """
-        if (self.exact.epoch[rows] != self._now).any():
+        if len(self.unknown(rows)):
             raise ValueError("there are vertices whose visibility is not known")
         length = self.exact.length[rows]
         ends = np.cumsum(length, dtype=np.int64)
@@ -253,7 +263,10 @@ class VisibilityStore:
 
     def unpack(self, rows: Points, pool: npt.NDArray[Any], length: I32) -> bool:
         """Takes over records that were packed for the same objects; False where they cannot be that."""
-        if len(rows) != len(length) or int(length.sum()) != len(pool) or pool.dtype != self.exact.pool.dtype:
+        types = pool.dtype == self.exact.pool.dtype and length.dtype == np.int32
+        if not types or pool.ndim != 1 or length.shape != rows.shape:
+            return False
+        if not readable(pool, length, len(self._slots), 1 << self.k):
             return False
         own = pool.copy()
         relabel(own, length.copy(), self._slots)
@@ -376,16 +389,3 @@ class VisibilityStore:
         self.counts += sum(counts.values(), np.zeros(COUNTS, np.int64))
         occluders.caster.count(int(sum(tally[RAYS] for tally in counts.values())))
         return [piece for begin in sorted(found) for piece in found[begin]], length, changed
-
-
-def _common(before: ShadingMesh, after: ShadingMesh) -> int:
-    """How many first vertices two meshes share: all of the shorter where one is the other refined."""
-    if before is after:
-        return len(after)
-    count = min(len(before), len(after))
-    same = (
-        before.edge == after.edge
-        and np.array_equal(before.positions[:count], after.positions[:count])
-        and np.array_equal(before.normals[:count], after.normals[:count])
-    )
-    return count if same else 0

@@ -77,6 +77,11 @@ class Bench:
         before, self.scene = self.scene, edit(self.scene)
         return self.update(diff(before, self.scene), job, moving)
 
+    def go(self, before, after) -> Radiance:
+        """From one scene to another, as undo does."""
+        self.scene = after
+        return self.update(diff(before, after))
+
     def look(self, transform, moving=False) -> Radiance:
         self.view = dataclasses.replace(self.view, transform=transform)
         return self.update(view_changed(), moving=moving)
@@ -566,6 +571,25 @@ def test_a_move_traces_less_than_everything(bench):
     assert done["vertices_summed"] < bench.made.valid.sum()
     done = work(bench, lambda: bench.do(BACK))
     assert 0 < done["rays"] < first / 2
+
+
+def test_what_comes_is_traced_and_what_goes_or_is_undone_is_not(bench):
+    first, scene = bench.made.counts["rays"], bench.scene
+    done = work(bench, lambda: bench.do(EDITS["add"]))
+    assert 0 < done["rays"] < first / 3
+    assert done["vertices_summed"] < bench.made.valid.sum()  # not where it hides nothing
+    more = bench.scene
+    for there, here in ((scene, more), (more, scene)):
+        done = work(bench, lambda there=there, here=here: bench.go(here, there))
+        assert done["rays"] == 0
+        assert 0 < done["vertices_summed"] < bench.made.valid.sum()
+        bench.assert_fresh()
+    done = work(bench, lambda: bench.do(EDITS["remove"]))
+    now = bench.scene
+    bench.go(now, more)
+    again = work(bench, lambda: bench.go(more, now))
+    assert again["rays"] == 0
+    assert done["rays"] < first / 5  # of what it hid from the eye
 
 
 def test_hidden_vertices_cost_nothing(host, services, bench):

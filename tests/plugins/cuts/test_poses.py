@@ -39,6 +39,22 @@ def test_what_is_out_of_date(pairs, slots):
             assert found[r, j] == oracle.out_of_date(then, now, r, j)
 
 
+@given(st.lists(transforms, min_size=1, max_size=4), st.sampled_from([0.0, 0.25]), slots_of, st.data())
+def test_what_holds_for_one_holds_for_all(before, by, slots, data):
+    now = [Transform((by, 0.0, 0.0)) @ one for one in before]
+    for _ in range(data.draw(st.integers(0, 1))):
+        now[data.draw(st.integers(0, len(now) - 1))] = data.draw(transforms)
+    then = list(before)
+    if data.draw(st.booleans()):
+        then[data.draw(st.integers(0, len(now) - 1))] = None
+    slots = np.array(slots[: len(now)], np.int64)
+    found = table(then, now, slots, 5)
+    known = [number for number, one in enumerate(then) if one is not None]
+    poses = Poses.of(tuple(then[n] for n in known), slots[known], 5)
+    assert Poses.of(tuple(now), slots, 5).hold(poses, slots) == (not found.any())
+    assert found.any(axis=1).all() or not found.any()
+
+
 @given(st.lists(transforms, min_size=2, max_size=4), st.tuples(*[st.floats(-50, 50)] * 3))
 def test_furniture_that_moves_together_keeps_what_it_knows_of_itself(group, by):
     still = Transform((9.0, 0.0, 0.0))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import numpy.typing as npt
 import pytest
@@ -12,7 +14,15 @@ from oracles import meshes
 from oracles.meshes import barycentric, box, edge_faces, euler, floor, joined, ring
 
 from studio_core.scene.geometry import Geometry
-from studio_core.scene.shading_mesh import NO_BACK, ShadingMesh, choose_edge, prepare, refine, shade_mesh
+from studio_core.scene.shading_mesh import (
+    NO_BACK,
+    ShadingMesh,
+    choose_edge,
+    prepare,
+    refine,
+    rung,
+    shade_mesh,
+)
 from studio_core.scene.surface import surface
 from studio_core.scene.topology import tolerance
 
@@ -350,6 +360,31 @@ def test_the_edge_follows_the_size_of_the_scene(scale: float) -> None:
     assume(scale > 0)
     base = choose_edge([(ring(), 1.0), (box(), 2.0)], 3000)
     assert choose_edge([(ring(), scale), (box(), 2 * scale)], 3000) == pytest.approx(base * scale, rel=0.05)
+
+
+@given(st.sampled_from(sorted(SHAPES)), st.floats(1e-3, 1e3), st.floats(0.97, 1.03))
+def test_edges_settle_on_a_ladder_of_the_geometry(name: str, edge: float, by: float) -> None:
+    geometry = SHAPES[name]
+    found = rung(geometry, edge)
+    assert 2**-0.2501 < found / edge < 2**0.2501
+    assert rung(geometry, found) == pytest.approx(found)
+    assert rung(geometry, found * by) == rung(geometry, found)
+    assert rung(geometry, 2 * edge) == pytest.approx(2 * found)
+    assert rung(geometry, found * 2**0.5) == pytest.approx(found * 2**0.5)
+
+
+def test_every_geometry_has_its_ladder_somewhere_else() -> None:
+    places = [math.log2(rung(geometry, 1.0)) for geometry in SHAPES.values()]
+    assert len({round(place, 6) for place in places}) == len(SHAPES)
+
+
+def test_what_is_not_split_is_one_mesh_whatever_edge_is_asked_for() -> None:
+    longest = math.sqrt(2)
+    made = [shade_mesh(box(), edge) for edge in (1.001 * longest, 2 * longest, 50.0)]
+    assert len({mesh.edge for mesh in made}) == 1
+    assert made[0].edge >= longest
+    assert np.array_equal(made[0].positions, made[2].positions)
+    assert len(shade_mesh(box(), 0.99 * longest)) > len(made[0])
 
 
 def test_a_scene_without_objects_and_a_budget_of_nothing() -> None:

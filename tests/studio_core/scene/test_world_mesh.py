@@ -79,6 +79,7 @@ def test_instances_and_versions_share_meshes() -> None:
     assert world.objects[1].mesh is world.objects[2].mesh
     assert all(a.mesh is b.mesh for a, b in zip(world.objects, again.objects, strict=True))
     same(world, again)
+    assert cache.mesh(floor(), 70.0) is cache.mesh(floor(), 90.0)  # nothing is split at either
     small = MeshCache(capacity=1)
     assert small.mesh(floor(), 0.5) is not small.mesh(box(), 0.5)
     same(world, scene(cache=small))
