@@ -31,6 +31,7 @@ from studio_core.shading.scheduler import ComputeThread, Executor
 from studio_ui.ask import Ask
 from studio_ui.bridge import Bridge
 from studio_ui.canvas.raster_viewport import RasterViewport
+from studio_ui.canvas.switch_viewport import SwitchViewport
 from studio_ui.context import Context
 from studio_ui.editing import Editing
 from studio_ui.feed import PictureFeed, Shading
@@ -114,7 +115,7 @@ def assemble(
     shading = shading or PluginShading(Services(workers, host, DiskCache(user_cache() / "computed")))
     feed = PictureFeed(document, session, shading, compute, bridge.post, bridge.later)
     context = Context(document, session, editing, host, journal, tasks, feed)
-    window = MainWindow(context, RasterViewport(), settings, files, _samples(), ask)
+    window = MainWindow(context, SwitchViewport(RasterViewport()), settings, files, _samples(), ask)
     for failure in host.failures:
         journal.write(f"The plugin {failure.plugin} {failure.what}", "problem", failure.traceback)
     _warm(context, compute, files, bridge)
@@ -134,6 +135,7 @@ def run_window(path: Path | None, *, read_only: bool = False) -> int:
         before, sys.excepthook = sys.excepthook, _hook(studio.context.journal)
         try:
             studio.window.show()
+            studio.window.canvas.start()
             if crashed:
                 studio.context.journal.write(
                     "The program crashed last time; its report is here.", "warning", crashed

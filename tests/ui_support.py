@@ -184,11 +184,15 @@ class Driver:
             self.context.session,
             self.context.feed,
         )
-        self.viewport: Any = self.window.viewport
         self._closed = False
         self.patience = 20_000  # milliseconds
         self.window.resize(1100, 700)
         self.window.show()
+
+    @property
+    def viewport(self) -> Any:
+        """The canvas that is shown now."""
+        return self.window.viewport.inner
 
     def show(self, scene: Scene) -> None:
         """Put a scene on the screen, looked at from the front."""

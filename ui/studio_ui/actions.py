@@ -93,6 +93,10 @@ ACTIONS: tuple[ActionSpec | None, ...] = (
     SEPARATOR,
     _a("view.brighter", "Brighter", "View", "+", canvas=True),
     _a("view.darker", "Darker", "View", "-", canvas=True),
+    _a("view.grid", "Ground grid", "View", "G", canvas=True, checkable=True),
+    _a("view.canvas_auto", "Automatic", "View/Canvas", group="canvas"),
+    _a("view.canvas_gpu", "Graphics card", "View/Canvas", group="canvas"),
+    _a("view.canvas_software", "Software", "View/Canvas", group="canvas"),
     _a("view.dark", "Dark theme", "View/Theme", group="theme"),
     _a("view.light", "Light theme", "View/Theme", group="theme"),
     SEPARATOR,
@@ -119,6 +123,10 @@ TIPS = {
     "object.group": "Hold what is chosen together",
     "object.lock": "Not picked or moved in the picture",
     "view.frame_selection": "See all of what is chosen (or everything)",
+    "view.grid": "Lines on the ground: decimetres, metres, ten metres",
+    "view.canvas_auto": "The graphics card where there is one",
+    "view.canvas_gpu": "Draw the picture with OpenGL",
+    "view.canvas_software": "Draw the picture without the graphics card",
     "view.brighter": "Half an EV more exposure",
     "view.darker": "Half an EV less exposure",
 }
@@ -170,8 +178,8 @@ class ActionSet:
                 canvas.addAction(action)
             else:
                 owner.addAction(action)
+            action.setCheckable(bool(spec.group) or spec.checkable)
             if spec.group:
-                action.setCheckable(True)
                 action.setIconVisibleInMenu(False)  # there the check mark tells
                 groups.setdefault(spec.group, QActionGroup(owner)).addAction(action)
             self.actions[spec.id] = action

@@ -18,8 +18,10 @@ from studio_core.shading.artifacts import MeasuredError
 from studio_core.shading.scheduler import Executor
 from studio_ui.actions import MOUSE, ActionSet, specs
 from studio_ui.ask import Ask
+from studio_ui.canvas.choice import PREFERENCES, CanvasChoice
+from studio_ui.canvas.switch_viewport import SwitchViewport
 from studio_ui.canvas.tools import CanvasTools
-from studio_ui.canvas.viewport import Pointer, Viewport
+from studio_ui.canvas.viewport import Pointer
 from studio_ui.commands import Commands
 from studio_ui.context import Context, Subscriptions
 from studio_ui.dialogs import Dialogs, KeysDialog, PluginsDialog
@@ -52,7 +54,7 @@ class MainWindow(QMainWindow):
     def __init__(
         self,
         context: Context,
-        viewport: Viewport,
+        viewport: SwitchViewport,
         settings: Settings,
         files_executor: Executor,
         samples: Mapping[str, Path] | None = None,
@@ -60,6 +62,7 @@ class MainWindow(QMainWindow):
     ) -> None:
         super().__init__()
         self.context, self.viewport, self.settings = context, viewport, settings
+        self.canvas = CanvasChoice(viewport, settings, context.journal.write)
         self.ask = ask or Dialogs(self)
         self.closing = False
         self._in_close = False
@@ -110,11 +113,13 @@ class MainWindow(QMainWindow):
             "file.quit": self.close,
             "view.dark": lambda: self.set_theme(THEMES["dark"]),
             "view.light": lambda: self.set_theme(THEMES["light"]),
+            "view.grid": lambda: self.set_grid(self.actions_["view.grid"].isChecked()),
             "window.reset": lambda: self.layout_.reset(),
             "help.keys": self._keys,
             "help.plugins": lambda: PluginsDialog(self, self.context.host).open(),
             "help.about": self._about,
         }
+        made |= {f"view.canvas_{name}": partial(self.canvas.prefer, name) for name in PREFERENCES}
         return made
 
     def _conditions(self) -> dict[str, Callable[[], bool]]:
@@ -203,6 +208,8 @@ class MainWindow(QMainWindow):
         self._display()
         self._backend()
         self._greet()
+        self.set_grid(self.settings.get("grid", False))
+        self.actions_[f"view.canvas_{self.canvas.preference}"].setChecked(True)
 
     # following
 
@@ -294,6 +301,12 @@ class MainWindow(QMainWindow):
         self._refresh_soon()
 
     # looks
+
+    def set_grid(self, shown: bool) -> None:
+        """Lines on the ground, remembered."""
+        self.settings.set("grid", shown)
+        self.actions_["view.grid"].setChecked(shown)
+        self.viewport.set_grid(shown)
 
     def set_theme(self, theme: Theme) -> None:
         """Another theme, remembered."""
@@ -389,6 +402,7 @@ class MainWindow(QMainWindow):
         if not self._autosave.isActive():
             return
         self.layout_.keep()
+        self.canvas.close()
         self._autosave.stop()
         self._soon.stop()
         self.tools.close()

@@ -16,10 +16,13 @@ from studio_core.session import View
 from studio_core.shading.artifacts import Picture
 from studio_core.signal import Signal
 from studio_ui.canvas.glyphs import Glyph
+from studio_ui.canvas.overlay import NOTHING, Overlay
 from studio_ui.feed import Freshness
 from studio_ui.theme import Theme
 
 Button = Literal["left", "middle", "right", "none"]
+GRID = (0.62, 0.64, 0.68)
+"""Colour of the lines on the ground, as displayed."""
 
 
 @dataclass(frozen=True)
@@ -75,9 +78,20 @@ class Viewport(Protocol):
         ...
 
     def set_guides(
-        self, view: View, glyphs: Iterable[Glyph], boxes: npt.NDArray[np.float64] | None = None
+        self,
+        view: View,
+        glyphs: Iterable[Glyph],
+        boxes: npt.NDArray[np.float64] | None = None,
+        overlay: Overlay = NOTHING,
     ) -> None:
-        """Lines over the picture as the present view sees them; `boxes` (N, 2, 3) follow a gesture."""
+        """Marks over the picture as the present view sees them; `boxes` (N, 2, 3) follow a gesture.
+
+        A canvas that can draw at once what the view sees, before there is a picture of it, does so.
+        """
+        ...
+
+    def set_grid(self, shown: bool) -> None:
+        """Lines on the ground."""
         ...
 
     def set_message(self, text: str) -> None:

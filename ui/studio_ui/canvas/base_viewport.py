@@ -1,0 +1,157 @@
+"""What all canvases keep and answer alike: the picture, what lies over it, and what is under the mouse."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+import numpy.typing as npt
+from PySide6.QtCore import QPointF, QRectF, QSizeF
+from PySide6.QtGui import QImage, QPainter
+from PySide6.QtWidgets import QWidget
+
+from studio_core.scene.nodes import NodeId
+from studio_core.session import View
+from studio_core.shading.artifacts import Picture
+from studio_ui.canvas.glyphs import Glyph
+from studio_ui.canvas.hand import Hand
+from studio_ui.canvas.overlay import NOTHING, Overlay, glyph_near, guides
+from studio_ui.canvas.overlay_painter import paint_badge, paint_message, paint_overlay
+from studio_ui.canvas.viewport import Probe
+from studio_ui.feed import Freshness
+from studio_ui.theme import DARK, Theme
+
+NO_VIEW = View()
+
+
+class BaseViewport(Hand):
+    """A `canvas.viewport.Viewport` but for drawing: `_picture_changed` and `_look_changed` are told of."""
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.freshness = Freshness.NONE
+        self._theme = DARK
+        self._picture: Picture | None = None
+        self._view = NO_VIEW  # of the picture
+        self._exposure, self._tonemap = 0.0, "srgb"
+        self._selection: frozenset[NodeId] = frozenset()
+        self._guide_view: View | None = None
+        self._glyphs: list[Glyph] = []
+        self._boxes: npt.NDArray[np.float64] | None = None
+        self._overlay = NOTHING
+        self._message = ""
+        self._grid = False
+
+    # what is shown
+
+    def set_picture(self, picture: Picture | None, view: View | None) -> None:
+        """Another picture, and the view it was made for."""
+        self._picture, self._view = picture, view or NO_VIEW
+        self._picture_changed()
+
+    def set_freshness(self, state: Freshness) -> None:
+        """Mark the picture."""
+        self.freshness = state
+        self._marks_changed()
+
+    def set_display(self, exposure: float, tonemap: str) -> None:
+        """Exposure in EV and the view transform."""
+        if (exposure, tonemap) != (self._exposure, self._tonemap):
+            self._exposure, self._tonemap = exposure, tonemap
+            self._display_changed()
+
+    def set_selection(self, nodes: Iterable[NodeId]) -> None:
+        """Meshes to be outlined, and glyphs to be lit."""
+        made = frozenset(nodes)
+        if made != self._selection:
+            self._selection = made
+            self._selection_changed()
+            self._marks_changed()
+
+    def set_guides(
+        self,
+        view: View,
+        glyphs: Iterable[Glyph],
+        boxes: npt.NDArray[np.float64] | None = None,
+        overlay: Overlay = NOTHING,
+    ) -> None:
+        """Marks over the picture as the present view sees them."""
+        self._guide_view, self._glyphs, self._boxes, self._overlay = view, list(glyphs), boxes, overlay
+        self._marks_changed()
+
+    def set_message(self, text: str) -> None:
+        """A line over an empty canvas."""
+        self._message = text
+        self._marks_changed()
+
+    def set_grid(self, shown: bool) -> None:
+        """Lines on the ground."""
+        if shown != self._grid:
+            self._grid = shown
+            self._display_changed()
+
+    def set_theme(self, theme: Theme) -> None:
+        """Colours around and over the picture."""
+        self._theme = theme
+        self._selection_changed()
+        self._marks_changed()
+
+    def grab_image(self) -> QImage:
+        """The canvas as it is seen."""
+        return self.grab().toImage()
+
+    def _picture_changed(self) -> None:
+        self.update()
+
+    def _display_changed(self) -> None:
+        self.update()
+
+    def _selection_changed(self) -> None:
+        self.update()
+
+    def _marks_changed(self) -> None:
+        self.update()
+
+    def _paint_marks(self, painter: QPainter) -> None:
+        """What lies over the picture."""
+        size = QSizeF(self.size())
+        overlay = guides(self._glyphs, self._boxes, self._selection) + self._overlay
+        paint_overlay(painter, size, self._guide_view or self._view, overlay, self._theme)
+        if self._message:
+            paint_message(painter, size, self._message, self._theme)
+        if self._picture is not None:
+            paint_badge(painter, size, self.freshness, self._theme)
+
+    # where things are
+
+    def target(self) -> QRectF:
+        """The rectangle that the picture fills, logical pixels: all of the width or all of the height."""
+        if self._picture is None:
+            return QRectF(self.rect())
+        height, width = self._picture.linear.shape[:2]
+        room = QRectF(self.rect())
+        if abs(width * room.height() - height * room.width()) <= 0.02 * width * room.height():
+            return room
+        shrink = min(room.width() / width, room.height() / height)
+        size = (width * shrink, height * shrink)
+        return QRectF((room.width() - size[0]) / 2, (room.height() - size[1]) / 2, *size)
+
+    def probe(self, x: float, y: float) -> Probe | None:
+        """What the shown picture has at a point of the canvas."""
+        if self._picture is None:
+            return None
+        room, place = self.target(), QPointF(x * self.width(), y * self.height())
+        height, width = self._picture.linear.shape[:2]
+        column = int((place.x() - room.left()) / room.width() * width)
+        row = int((place.y() - room.top()) / room.height() * height)
+        if not (0 <= column < width and 0 <= row < height):
+            return None
+        index = int(self._picture.node[row, column])
+        red, green, blue = (float(c) for c in self._picture.linear[row, column])
+        node = self._picture.nodes[index] if index >= 0 else None
+        return Probe(node, float(self._picture.distance[row, column]), (red, green, blue))
+
+    def glyph_at(self, x: float, y: float) -> NodeId | None:
+        """The lamp or camera drawn near a point of the canvas."""
+        view = self._guide_view or self._view
+        return glyph_near(self._glyphs, view, x, y, (self.width(), self.height()))

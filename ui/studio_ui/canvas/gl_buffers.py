@@ -1,0 +1,122 @@
+"""Vertex buffers that are told what changed, and how much went to the GPU for it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from vispy import gloo
+
+F32 = npt.NDArray[np.float32]
+Bools = npt.NDArray[np.bool_]
+
+PAGE = 64
+"""Vertices that are uploaded together."""
+GROWTH = 1.25
+
+
+@dataclass
+class Tally:
+    """What went to the GPU: bytes of vertices' colours, of everything else, uploads and draw calls."""
+
+    colours: int = 0
+    shapes: int = 0
+    maps: int = 0
+    uploads: int = 0
+    draws: int = 0
+
+    def copy(self) -> Tally:
+        """As it is now."""
+        return Tally(self.colours, self.shapes, self.maps, self.uploads, self.draws)
+
+    def since(self, before: Tally) -> Tally:
+        """What came after `before`."""
+        pairs = zip(vars(self).items(), vars(before).values(), strict=True)
+        return Tally(**{name: now - then for (name, now), then in pairs})
+
+
+class Attribute:
+    """Floats (N, width ≤ 4) on the GPU with room for more; `host` is what is there."""
+
+    def __init__(self, width: int, tally: Tally, what: str) -> None:
+        self.width, self._tally, self._what = width, tally, what
+        self.host: F32 = np.zeros((0, width), np.float32)
+        self.buffer: Any = None
+        self.room = 0
+
+    def resize(self, room: int) -> None:
+        """A buffer for so many vertices, as all that are drawn together must be; another one is empty."""
+        if room != self.room:
+            self.delete()
+            self.room = room
+
+    def replace_tail(self, values: F32) -> None:
+        """Hold `values`; what begins alike is not uploaded again. `values` are not copied."""
+        common = min(len(values), len(self.host))
+        differs = (values[:common] != self.host[:common]).any(axis=1)
+        first = int(differs.argmax()) if differs.any() else common
+        if first < len(values):
+            self._upload(values, first, len(values))
+        if first < common or len(values) >= len(self.host):
+            self.host = values
+
+    def update(self, values: F32, known: Bools) -> None:
+        """Hold `values` (N, width) where they are `known`; pages that hold other ones are uploaded."""
+        old = self.host
+        if len(old) < len(values):
+            old = np.concatenate([old, self._unknown(values[len(old) :], known[len(old) :])])
+            fresh = np.zeros(len(values), np.bool_)
+            fresh[len(self.host) :] = True
+        else:
+            fresh = np.zeros(len(values), np.bool_)
+        part = old[: len(values)]
+        changed = known & (values != part).any(axis=1)
+        if changed.all() and len(part) == len(old):
+            self.host = values.copy()
+        else:
+            part[changed] = values[changed]
+            self.host = old
+        self._pages(changed | fresh)
+
+    def _unknown(self, values: F32, known: Bools) -> F32:
+        """What vertices that nothing is known of are shown with: the mean of the others."""
+        mean = values[known].mean(axis=0) if known.any() else np.full(self.width, np.nan, np.float32)
+        if not np.isfinite(mean).all():
+            mean = self.host.mean(axis=0) if len(self.host) else np.zeros(self.width, np.float32)
+        made = np.empty_like(values)
+        made[:] = mean
+        return made
+
+    def _pages(self, changed: Bools) -> None:
+        count = len(changed)
+        if not changed.any():
+            return
+        if changed.all():
+            self._upload(self.host, 0, count)
+            return
+        touched = np.logical_or.reduceat(changed, np.arange(0, count, PAGE))
+        steps = np.flatnonzero(np.diff(np.concatenate([[False], touched, [False]]).astype(np.int8)))
+        for start, stop in steps.reshape(-1, 2).tolist():
+            self._upload(self.host, start * PAGE, min(stop * PAGE, count))
+
+    def _upload(self, values: F32, start: int, stop: int) -> None:
+        if self.buffer is None:
+            self.room = max(self.room, len(values))
+            whole = np.zeros((self.room, self.width), np.float32)
+            whole[: len(values)] = values
+            self.buffer = gloo.VertexBuffer(whole)
+            moved = whole.nbytes
+        else:
+            piece = np.ascontiguousarray(values[start:stop], np.float32)
+            self.buffer.set_subdata(piece, start)
+            moved = piece.nbytes
+        setattr(self._tally, self._what, getattr(self._tally, self._what) + moved)
+        self._tally.uploads += 1
+
+    def delete(self) -> None:
+        """Give it back."""
+        if self.buffer is not None:
+            self.buffer.delete()
+        self.buffer, self.host = None, np.zeros((0, self.width), np.float32)

@@ -1,0 +1,372 @@
+"""Shaders of the GPU canvas: what `studio_core.kernels.compose`, `background` and `display` do, per fragment.
+
+GLSL 1.20, the common ground of every desktop driver. Light is multiplied with the exposure where it is
+written, so that half floats keep their precision where the display shows it.
+"""
+
+from __future__ import annotations
+
+from studio_core.kernels.compose import AFFINE, GENERAL
+from studio_ui.canvas.grid import LIFT, REACH, STEPS, WIDE
+
+MESH_VERTEX = """
+#version 120
+attribute vec3 a_position;
+#ifdef LIT
+attribute vec3 a_plain;
+varying vec3 v_plain;
+#endif
+#ifdef MAPPED
+attribute vec2 a_uv;
+varying vec2 v_uv;
+#endif
+#ifdef AFFINE
+attribute vec3 a_slope;
+varying vec3 v_slope;
+#endif
+#ifdef GENERAL
+attribute vec3 a_sum0;
+attribute vec3 a_sum1;
+attribute vec3 a_sum2;
+varying vec3 v_sum0;
+varying vec3 v_sum1;
+varying vec3 v_sum2;
+#endif
+uniform mat4 u_eye_from_model;
+uniform mat4 u_projection;
+varying vec3 v_eye;
+
+void main() {
+    v_eye = (u_eye_from_model * vec4(a_position, 1.0)).xyz;
+#ifdef LIT
+    v_plain = a_plain;
+#endif
+#ifdef MAPPED
+    v_uv = a_uv;
+#endif
+#ifdef AFFINE
+    v_slope = a_slope;
+#endif
+#ifdef GENERAL
+    v_sum0 = a_sum0;
+    v_sum1 = a_sum1;
+    v_sum2 = a_sum2;
+#endif
+    gl_Position = u_projection * vec4(v_eye, 1.0);
+}
+"""
+
+_MAPS = """
+uniform vec4 u_uv_scale;       // scale and offset
+uniform vec2 u_finest;         // size of the finest level, texels
+uniform float u_levels;
+uniform vec2 u_atlas;          // size
+uniform float u_pixel_angle;
+
+float repeated(float u, float scale, float offset) {
+    float made = u * scale + offset;
+    return made - floor(made);
+}
+
+// Left, top, width and height of a level in the atlas.
+vec4 place_of(float level) {
+    vec2 size = u_finest;
+    float top = 0.0;
+    for (int k = 0; k < LEVELS; k++) {
+        if (float(k) >= level) break;
+        if (k > 0) top += size.y;
+        size = max(floor(0.5 * size), 1.0);
+    }
+    return vec4(level > 0.5 ? u_finest.x : 0.0, top, size);
+}
+
+// The mip level whose texels are about as large as a pixel; density is that of the face, from derivatives.
+vec4 map_level(vec2 uv) {
+    vec3 across = dFdx(v_eye), down = dFdy(v_eye);
+    vec3 normal = cross(across, down);
+    float area = max(length(normal), 1e-30);
+    vec2 du = dFdx(uv) * u_uv_scale.xy, dv = dFdy(uv) * u_uv_scale.xy;
+    float in_map = abs(du.x * dv.y - du.y * dv.x) * u_finest.x * u_finest.y;
+    float away = max(length(v_eye), 1e-30);
+    float cosine = max(abs(dot(normal, v_eye)) / (area * away), 0.05);
+    float footprint = away * u_pixel_angle * sqrt(in_map / area) / sqrt(cosine);
+    float level = clamp(floor(log2(max(footprint, 1e-6)) + 0.5), 0.0, u_levels - 1.0);
+    return place_of(level);
+}
+
+vec3 texel(sampler2D map, vec4 level, vec2 uv) {
+    vec2 at = vec2(repeated(uv.x, u_uv_scale.x, u_uv_scale.z), repeated(uv.y, u_uv_scale.y, u_uv_scale.w));
+    vec2 place = at * level.zw - 0.5;
+    vec2 low = floor(place), part = place - low;
+    vec2 high = low + 1.0;
+    low = mix(low, low + level.zw, vec2(lessThan(low, vec2(0.0))));
+    high = mix(high, high - level.zw, vec2(greaterThanEqual(high, level.zw)));
+    low = (low + level.xy + 0.5) / u_atlas;
+    high = (high + level.xy + 0.5) / u_atlas;
+    vec3 a = texture2D(map, low).rgb, b = texture2D(map, vec2(high.x, low.y)).rgb;
+    vec3 c = texture2D(map, vec2(low.x, high.y)).rgb, d = texture2D(map, high).rgb;
+    return mix(mix(a, b, part.x), mix(c, d, part.x), part.y);
+}
+"""
+
+MESH_FRAGMENT = (
+    """
+#version 120
+varying vec3 v_plain;
+varying vec3 v_eye;
+uniform float u_gain;
+#ifdef PEELED
+uniform sampler2D u_layer;   // alpha: distance of the layer that is shown now
+uniform vec2 u_size;
+uniform float u_opacity;
+#endif
+#ifdef MAPPED
+varying vec2 v_uv;
+"""
+    + _MAPS
+    + """
+#endif
+#ifdef AFFINE
+varying vec3 v_slope;
+uniform sampler2D u_map0;
+#endif
+#ifdef GENERAL
+varying vec3 v_sum0;
+varying vec3 v_sum1;
+varying vec3 v_sum2;
+uniform sampler2D u_map0;
+uniform sampler2D u_map1;
+uniform sampler2D u_map2;
+#endif
+
+void main() {
+    vec3 light = v_plain;
+#ifdef MAPPED
+    vec4 level = map_level(v_uv);
+#endif
+#ifdef AFFINE
+    light += texel(u_map0, level, v_uv) * v_slope;
+#endif
+#ifdef GENERAL
+    light += texel(u_map0, level, v_uv) * v_sum0;
+    light += texel(u_map1, level, v_uv) * v_sum1;
+    light += texel(u_map2, level, v_uv) * v_sum2;
+#endif
+    float away = length(v_eye);
+#ifdef PEELED
+    float shown = texture2D(u_layer, gl_FragCoord.xy / u_size).a;
+    if (abs(away - shown) > 1e-6 * shown) discard;
+    gl_FragColor = vec4(u_opacity * u_gain * light, u_opacity);
+#else
+    gl_FragColor = vec4(u_gain * light, away);
+#endif
+}
+"""
+)
+
+LAYER_FRAGMENT = """
+#version 120
+varying vec3 v_eye;
+uniform sampler2D u_opaque;   // alpha: distance of what cannot be looked through
+uniform sampler2D u_before;   // alpha: distance of the last layer
+uniform vec2 u_size;
+
+void main() {
+    vec2 at = gl_FragCoord.xy / u_size;
+    float away = length(v_eye);
+    if (away >= texture2D(u_opaque, at).a) discard;
+    if (away <= texture2D(u_before, at).a * (1.0 + 1e-5)) discard;
+    gl_FragColor = vec4(0.0, 0.0, 0.0, away);
+}
+"""
+"""The nearest transparent surface behind the last layer."""
+
+PLAIN_FRAGMENT = """
+#version 120
+varying vec3 v_eye;
+uniform vec4 u_colour;
+
+void main() {
+    gl_FragColor = vec4(u_colour.rgb, u_colour.a < 0.0 ? length(v_eye) : u_colour.a);
+}
+"""
+"""One colour: selection masks and picking (there alpha is the distance)."""
+
+SCREEN_VERTEX = """
+#version 120
+attribute vec2 a_corner;
+varying vec2 v_at;
+
+void main() {
+    v_at = 0.5 * a_corner + 0.5;
+    gl_Position = vec4(a_corner, 1.0, 1.0);
+}
+"""
+
+BACKDROP_FRAGMENT = """
+#version 120
+varying vec2 v_at;
+uniform sampler2D u_sky;
+uniform vec2 u_sky_size;
+uniform mat3 u_turn;   // picture from camera
+uniform vec2 u_extent; // half width and half height of the picture at distance 1
+uniform vec3 u_light;  // gain and exposure
+const float PI = 3.14159265358979;
+
+vec3 at(float column, float row) {
+    column = mod(column, u_sky_size.x);
+    row = clamp(row, 0.0, u_sky_size.y - 1.0);
+    return texture2D(u_sky, (vec2(column, row) + 0.5) / u_sky_size).rgb;
+}
+
+void main() {
+    vec3 d = u_turn * vec3((2.0 * v_at - 1.0) * u_extent, -1.0);
+    float s = (0.5 - atan(d.x, d.z) / (2.0 * PI)) * u_sky_size.x - 0.5;
+    float t = atan(length(d.xz), d.y) / PI * u_sky_size.y - 0.5;
+    float s0 = floor(s), t0 = floor(t);
+    vec3 near = mix(at(s0, t0), at(s0 + 1.0, t0), s - s0);
+    vec3 far = mix(at(s0, t0 + 1.0), at(s0 + 1.0, t0 + 1.0), s - s0);
+    gl_FragColor = vec4(u_light * mix(near, far, t - t0), 1e30);
+}
+"""
+
+STILL_FRAGMENT = """
+#version 120
+varying vec2 v_at;
+uniform sampler2D u_still;
+uniform float u_gain;
+
+void main() {
+    gl_FragColor = vec4(u_gain * texture2D(u_still, vec2(v_at.x, 1.0 - v_at.y)).rgb, 1e30);
+}
+"""
+"""A finished picture, its rows from the top."""
+
+DISPLAY_FRAGMENT = """
+#version 120
+varying vec2 v_at;
+uniform sampler2D u_opaque;
+uniform sampler2D u_clear;    // light of transparent surfaces, and what they let through
+uniform sampler2D u_marks;    // red: chosen
+uniform vec2 u_size;          // of those, samples
+uniform float u_samples;      // along each side of a pixel
+uniform float u_layered;
+uniform float u_marked;
+uniform float u_rim;          // width of the outline, pixels
+uniform vec3 u_accent;
+uniform float u_gridded;
+uniform vec3 u_grid;          // colour of the ground's lines
+uniform mat3 u_axes;          // columns: right, up and back of the camera in the world
+uniform vec3 u_eye;
+uniform vec2 u_extent;
+uniform float u_kind;         // 0 colour-true, 1 filmic, 2 raw
+
+float lit(float x) {
+    return x > 0.0 ? min(x, 1e6) : 0.0;  // NaN is none
+}
+
+vec3 film(vec3 light) {
+    vec3 x = vec3(
+        dot(vec3(0.59719, 0.35458, 0.04823), light),
+        dot(vec3(0.07600, 0.90834, 0.01566), light),
+        dot(vec3(0.02840, 0.13383, 0.83777), light));
+    x = (x * (x + 0.0245786) - 0.000090537) / (x * (0.983729 * x + 0.4329510) + 0.238081);
+    return vec3(
+        dot(vec3(1.60475, -0.53108, -0.07367), x),
+        dot(vec3(-0.10208, 1.10813, -0.00605), x),
+        dot(vec3(-0.00327, -0.07276, 1.07602), x));
+}
+
+vec3 curve(vec3 x) {
+    return mix(12.92 * x, 1.055 * pow(x, vec3(1.0 / 2.4)) - 0.055, vec3(greaterThan(x, vec3(0.0031308))));
+}
+
+float chosen(vec2 pixel) {
+    vec2 at = (pixel * u_samples + vec2(0.5, u_samples - 0.5)) / u_size;
+    bool inside = at.x > 0.0 && at.y > 0.0 && at.x < 1.0 && at.y < 1.0;
+    return inside ? texture2D(u_marks, at).r : 0.0;
+}
+
+float lines(vec2 place, vec2 span, float step) {
+    vec2 near = abs(fract(place / step + 0.5) - 0.5) * step / max(span, 1e-9);
+    float fine = 1.0 - smoothstep(0.15, 0.6, max(span.x, span.y) / step);
+    return fine * clamp(WIDE + 0.5 - min(near.x, near.y), 0.0, 1.0);
+}
+
+// See canvas.grid.
+float grid(vec2 pixel) {
+    vec2 size = u_size / u_samples;
+    vec2 at = (2.0 * (pixel + 0.5) / size - 1.0) * u_extent;
+    vec3 ray = u_axes * vec3(at, -1.0);
+    float reach = -u_eye.y / ray.y;
+    float away = reach * length(vec3(at, 1.0));
+    float seen = texture2D(u_opaque, (pixel * u_samples + vec2(0.5, u_samples - 0.5)) / u_size).a;
+    if (!(reach > 0.0 && away < REACH && away * LIFT <= seen)) return 0.0;
+    vec2 step = 2.0 * u_extent / size;
+    vec2 span = abs(reach * (u_axes[0].xz - ray.xz * u_axes[0].y / ray.y)) * step.x
+        + abs(reach * (u_axes[1].xz - ray.xz * u_axes[1].y / ray.y)) * step.y;
+    vec2 place = u_eye.xz + reach * ray.xz;
+    float strength = STRENGTHS;
+    return strength * (1.0 - smoothstep(0.35, 1.0, away / REACH));
+}
+
+void main() {
+    vec2 pixel = floor(v_at * u_size / u_samples);
+    vec3 light = vec3(0.0);
+    for (float y = 0.5; y < u_samples; y += 1.0) {
+        for (float x = 0.5; x < u_samples; x += 1.0) {
+            vec2 at = (pixel * u_samples + vec2(x, y)) / u_size;
+            vec3 here = texture2D(u_opaque, at).rgb;
+            if (u_layered > 0.5) {
+                vec4 before = texture2D(u_clear, at);
+                here = before.rgb + before.a * here;
+            }
+            light += here;
+        }
+    }
+    light /= u_samples * u_samples;
+    light = vec3(lit(light.r), lit(light.g), lit(light.b));
+    if (u_kind > 0.5 && u_kind < 1.5) light = film(light);
+    vec3 shown = clamp(light, 0.0, 1.0);
+    if (u_kind < 1.5) shown = curve(shown);
+    if (u_gridded > 0.5) shown = mix(shown, u_grid, grid(pixel));
+    if (u_marked > 0.5 && chosen(pixel) < 0.5) {
+        float near = 0.0;
+        for (float y = -u_rim; y <= u_rim; y += 1.0)
+            for (float x = -u_rim; x <= u_rim; x += 1.0)
+                if (abs(x) + abs(y) <= u_rim) near = max(near, chosen(pixel + vec2(x, y)));
+        if (near > 0.5) shown = u_accent;
+    }
+    gl_FragColor = vec4(shown, 1.0);
+}
+"""
+"""Samples to pixels: averaged, tone-mapped as `studio_core.kernels.tonemap` does, lines and outline added."""
+
+
+def display_program() -> tuple[str, str]:
+    """The last pass."""
+    strength = "0.0"
+    for step, strong in STEPS:
+        strength = f"max({strength}, {strong:.6f} * lines(place, span, {step:.6f}))"
+    source = DISPLAY_FRAGMENT.replace("STRENGTHS", strength)
+    numbers = {"WIDE": WIDE, "REACH": REACH, "LIFT": LIFT}
+    defines = "".join(f"#define {name} {value:.6f}\n" for name, value in numbers.items())
+    return SCREEN_VERTEX.strip(), _defined(source, defines)
+
+
+def mesh_program(kind: int, peeled: bool, levels: int) -> tuple[str, str]:
+    """Vertex and fragment shader for surfaces whose coefficients are of a kind of `kernels.compose`."""
+    names = ["LIT", *({AFFINE: ["MAPPED", "AFFINE"], GENERAL: ["MAPPED", "GENERAL"]}.get(kind, []))]
+    names += ["PEELED"] if peeled else []
+    defines = "".join(f"#define {name}\n" for name in names) + f"#define LEVELS {levels}\n"
+    return _defined(MESH_VERTEX, defines), _defined(MESH_FRAGMENT, defines)
+
+
+def plain_program(fragment: str) -> tuple[str, str]:
+    """The surfaces' vertex shader with a fragment shader that does not ask for their light."""
+    return _defined(MESH_VERTEX, ""), fragment.strip()
+
+
+def _defined(source: str, defines: str) -> str:
+    version, _, rest = source.strip().partition("\n")
+    return f"{version}\n{defines}{rest}"

@@ -1,0 +1,116 @@
+"""What the hand does on a canvas: mouse, wheel and keys of a widget as signals without Qt in them."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import QEvent, QPointF, QSize, Qt
+from PySide6.QtGui import QFocusEvent, QKeyEvent, QMouseEvent, QResizeEvent, QWheelEvent
+from PySide6.QtWidgets import QSizePolicy, QWidget
+
+from studio_core.signal import Signal
+from studio_ui.canvas.viewport import Button, Pointer
+
+_BUTTONS: dict[Qt.MouseButton, Button] = {
+    Qt.MouseButton.LeftButton: "left",
+    Qt.MouseButton.MiddleButton: "middle",
+    Qt.MouseButton.RightButton: "right",
+}
+_KEYS = {Qt.Key.Key_Escape: "escape", Qt.Key.Key_R: "r"}
+
+
+class Hand(QWidget):
+    """A widget with the signals of `canvas.viewport.Viewport`."""
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.widget: QWidget = self
+        self.pointer: Signal[[Pointer]] = Signal()
+        self.wheel: Signal[[Pointer, float]] = Signal()
+        self.key: Signal[[str, bool]] = Signal()
+        self.left: Signal[[]] = Signal()
+        self.resized: Signal[[int, int]] = Signal()
+        self._held: Button = "none"
+        self.setMouseTracking(True)
+        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
+        self.setMinimumSize(240, 160)
+        self.setAccessibleName("Picture")
+
+    def device_size(self) -> tuple[int, int]:
+        """Width and height in device pixels."""
+        ratio = self.devicePixelRatioF()
+        return round(self.width() * ratio), round(self.height() * ratio)
+
+    def sizeHint(self) -> QSize:
+        """Some room to start with."""
+        return QSize(960, 600)
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        """Device pixels are what a picture is made for."""
+        self.resized.emit(*self.device_size())
+
+    def mousePressEvent(self, event: QMouseEvent) -> None:
+        """Remember the button until it is released."""
+        if self._held == "none" or event.buttons() == event.button():  # a release may have been missed
+            self._held = _BUTTONS.get(event.button(), "none")
+            self._send("press", event)
+
+    def mouseMoveEvent(self, event: QMouseEvent) -> None:
+        """With what is held."""
+        self._send("move", event)
+
+    def mouseReleaseEvent(self, event: QMouseEvent) -> None:
+        """Only of the button that was pressed first."""
+        if _BUTTONS.get(event.button()) == self._held:
+            self._send("release", event)
+            self._held = "none"
+
+    def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:
+        """A second press at the same place."""
+        self._held = _BUTTONS.get(event.button(), "none")
+        self._send("double", event)
+
+    def wheelEvent(self, event: QWheelEvent) -> None:
+        """Steps of a wheel, or of a touchpad."""
+        steps = event.angleDelta().y() / 120 or event.pixelDelta().y() / 60
+        if steps:
+            self.wheel.emit(self._pointer("move", event.position(), event.modifiers()), steps)
+        event.accept()
+
+    def leaveEvent(self, event: QEvent) -> None:
+        """Nothing is under the mouse any more."""
+        self.left.emit()
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        """Keys that are held; the others are actions of the window."""
+        self._key(event, True)
+
+    def keyReleaseEvent(self, event: QKeyEvent) -> None:
+        """The end of it."""
+        self._key(event, False)
+
+    def focusOutEvent(self, event: QFocusEvent) -> None:
+        """Keys that are still held count as released."""
+        self.key.emit("r", False)
+        super().focusOutEvent(event)
+
+    def _key(self, event: QKeyEvent, pressed: bool) -> None:
+        name = _KEYS.get(Qt.Key(event.key()))
+        if name is not None and not event.modifiers() and not event.isAutoRepeat():
+            self.key.emit(name, pressed)
+        elif name is None:
+            event.ignore()
+
+    def _send(self, kind: str, event: QMouseEvent) -> None:
+        self.pointer.emit(self._pointer(kind, event.position(), event.modifiers()))
+
+    def _pointer(self, kind: str, at: QPointF, keys: Qt.KeyboardModifier) -> Pointer:
+        return Pointer(
+            kind,  # type: ignore[arg-type]
+            at.x() / max(self.width(), 1),
+            at.y() / max(self.height(), 1),
+            self._held,
+            bool(keys & Qt.KeyboardModifier.ShiftModifier),
+            bool(keys & Qt.KeyboardModifier.ControlModifier),
+            bool(keys & Qt.KeyboardModifier.AltModifier),
+            (self.width(), self.height()),
+        )

@@ -1,0 +1,157 @@
+"""The canvas on the GPU: the surfaces of the last picture, drawn as the present view sees them.
+
+A new view is drawn at once, with the radiance that there is; the next picture brings what is new in it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+
+import numpy as np
+import numpy.typing as npt
+from PySide6.QtCore import QRectF, Qt
+from PySide6.QtGui import QColor, QImage, QPainter, QPaintEvent, QResizeEvent
+from PySide6.QtWidgets import QWidget
+
+from studio_core.session import View
+from studio_core.shading.artifacts import Picture
+from studio_ui.canvas.base_viewport import BaseViewport
+from studio_ui.canvas.gl_buffers import Tally
+from studio_ui.canvas.gl_renderer import Look
+from studio_ui.canvas.gl_report import SOFTWARE
+from studio_ui.canvas.gl_surface import GlSurface
+from studio_ui.canvas.glyphs import Glyph
+from studio_ui.canvas.overlay import NOTHING, Overlay
+from studio_ui.canvas.viewport import GRID, Probe
+from studio_ui.feed import Freshness
+
+SMOOTH_SAMPLES = 18_000_000
+"""Up to here a pixel gets four samples: of 4K nearly all of a window, in 300 MB."""
+_STILL = (Freshness.CURRENT, Freshness.REFINING)
+
+
+class _Marks(QWidget):
+    """What lies over the picture; above the surface, and not in the way of the mouse."""
+
+    def __init__(self, paint: Callable[[QPainter], None], parent: QWidget) -> None:
+        super().__init__(parent)
+        self._paint = paint
+        self.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        """Everything."""
+        painter = QPainter(self)
+        self._paint(painter)
+        painter.end()
+
+
+class VispyViewport(BaseViewport):
+    """Satisfies `canvas.viewport.Viewport`. `failed` is told, once, why nothing can be drawn any more."""
+
+    def __init__(self, failed: Callable[[str], None], parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.surface = GlSurface(self._content, failed, self)
+        self.surface.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
+        self._marks = _Marks(self._paint_marks, self)
+        self._marks.raise_()
+
+    @property
+    def tally(self) -> Tally:
+        """What went to the GPU."""
+        return self.surface.tally
+
+    @property
+    def view(self) -> View:
+        """What is drawn: the view of the guides, which is the newest."""
+        return self._guide_view or self._view
+
+    def target(self) -> QRectF:
+        """All of the canvas."""
+        return QRectF(self.rect())
+
+    def probe(self, x: float, y: float) -> Probe | None:
+        """What lies under a point: from the picture, or from the GPU while it shows another view."""
+        picture = self._picture
+        if picture is None or self._same_view():
+            return super().probe(x, y)
+        if picture.colours is None:
+            return None
+        found = self.surface.pick(picture, self.view.sized(*self.device_size()), x, y)
+        if found is None:
+            return Probe(None, float("inf"), (0.0, 0.0, 0.0))
+        return Probe(picture.nodes[found.object], found.distance, found.radiance)
+
+    def grab_image(self) -> QImage:
+        """The canvas as it is seen."""
+        image = self.surface.grabFramebuffer()
+        painter = QPainter(image)
+        self._paint_marks(painter)
+        painter.end()
+        return image
+
+    def set_freshness(self, state: Freshness) -> None:
+        """Mark the picture; at rest it is drawn with more samples."""
+        still = self.freshness in _STILL
+        super().set_freshness(state)
+        if still != (state in _STILL) and self._slow():
+            self.surface.update()
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        """Surface and marks fill the canvas."""
+        self.surface.setGeometry(self.rect())
+        self._marks.setGeometry(self.rect())
+        super().resizeEvent(event)
+
+    def _same_view(self) -> bool:
+        now, then = self.view, self._view
+        return (now.transform, now.fov) == (then.transform, then.fov)
+
+    def _slow(self) -> bool:
+        """Whether no graphics card draws."""
+        return any(name in self.surface.drawn_by.lower() for name in SOFTWARE)
+
+    def _content(self, width: int, height: int) -> tuple[Picture | None, Look] | None:
+        """What the surface is to draw."""
+        theme, ratio = self._theme, self.devicePixelRatioF()
+        smooth = 4 * width * height <= SMOOTH_SAMPLES
+        if self._slow() and self.freshness not in _STILL:
+            smooth = False
+        accent, ground = QColor(theme.accent), QColor(theme.canvas)
+        look = Look(
+            self.view.sized(width, height),
+            2 if smooth else 1,
+            self._exposure,
+            self._tonemap,
+            self._selection,
+            max(1, round(ratio * (2 if width > 700 * ratio else 1))),
+            (accent.redF(), accent.greenF(), accent.blueF()),
+            GRID if self._grid else None,
+            (ground.redF(), ground.greenF(), ground.blueF()),
+        )
+        return self._picture, look
+
+    def _picture_changed(self) -> None:
+        self.surface.update()
+        self._marks.update()
+
+    def _display_changed(self) -> None:
+        self.surface.update()
+
+    def _selection_changed(self) -> None:
+        self.surface.update()
+
+    def _marks_changed(self) -> None:
+        self._marks.update()
+
+    def set_guides(
+        self,
+        view: View,
+        glyphs: Iterable[Glyph],
+        boxes: npt.NDArray[np.float64] | None = None,
+        overlay: Overlay = NOTHING,
+    ) -> None:
+        """Marks over the picture; another view is drawn at once."""
+        before = self.view
+        super().set_guides(view, glyphs, boxes, overlay)
+        if self.view != before:
+            self.surface.update()
