@@ -1,7 +1,7 @@
 """Makes the pictures of these pages: `python docs/pictures/make.py room | window | chair`, from a checkout.
 
 `room` renders the sample room, `window` photographs the window when it has come to rest, `chair` drags a
-chair as a hand does, with moving frames on the unrefined mesh, and lets it rest, exact and refined.
+chair through the settled room as a hand does and lets it rest, exact and refined.
 """
 
 from __future__ import annotations
@@ -93,8 +93,8 @@ def frames() -> Iterator[np.ndarray]:
     backend = program.registry.get("backend", "cuts")
     pipeline = Pipeline([*backend.stages(program.services), PictureStage(program.services)])
     view = dataclasses.replace(scene_view(scene, None, *SIZE), antialias=2)
-    refined, plain = backend.Params(), backend.Params(refine=False)
-    pipeline.update(Frame(scene, view, plain), everything(scene), Job("room"))
+    params = backend.Params()
+    pipeline.update(Frame(scene, view, params), everything(scene), Job("room"))
     shown = scene
     for step in range(STEPS + 1):
         share = 0.5 - 0.5 * np.cos(np.pi * step / STEPS)
@@ -104,7 +104,7 @@ def frames() -> Iterator[np.ndarray]:
         changes = diff(shown, moved)
         if last:
             changes |= view_changed() | view_changed(Aspect.QUALITY)
-        frame = Frame(moved, view, refined if last else plain, step, moving=not last)
+        frame = Frame(moved, view, params, step, moving=not last)
         picture, shown = pipeline.update(frame, changes, Job("chair")), moved
         yield tonemap(picture.linear, 0.0, "srgb")
 

@@ -166,3 +166,36 @@ def meets_sphere(position: F64, targets: F64, centre: F64, radius: float) -> boo
         if np.linalg.norm(position + along * way - centre) <= radius:
             return True
     return False
+
+
+def filled(
+    between: npt.NDArray[np.int64],
+    material: npt.NDArray[np.int32],
+    summed: Bools,
+    wanted: Bools,
+    settled: Bools,
+    terms: npt.NDArray[np.float32],
+    irradiance: npt.NDArray[np.float32],
+    usual: float,
+) -> tuple[F64, F64]:
+    """Terms (V, T, 3) and irradiance (V, 3) of refined vertices, asked for one after the other."""
+    common = {}
+    for kind in set(material.tolist()):
+        own = summed & (material == kind)
+        light = irradiance[own].sum(axis=0, dtype=np.float64)
+        sums = terms[own].sum(axis=0, dtype=np.float64)
+        common[kind] = np.divide(sums, light, out=np.zeros(sums.shape), where=light > 0)
+
+    def of(i: int) -> tuple[F64, F64]:
+        if summed[i]:
+            return terms[i].astype(np.float64), irradiance[i].astype(np.float64)
+        (t1, e1), (t2, e2) = of(between[i, 0]), of(between[i, 1])
+        if not (settled[i] and wanted[i]):
+            return (t1 + t2) / 2, (e1 + e2) / 2
+        own = irradiance[i].astype(np.float64)
+        light = e1 + e2 + usual * own
+        sums = own * (t1 + t2 + usual * own * common[material[i]])
+        return np.divide(sums, light, out=np.zeros(sums.shape), where=light > 0), own
+
+    made = [of(i) if wanted[i] else (terms[i], irradiance[i]) for i in range(len(terms))]
+    return np.array([one[0] for one in made]), np.array([one[1] for one in made])

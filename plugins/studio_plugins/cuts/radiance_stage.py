@@ -104,7 +104,7 @@ class RadianceStage:
                 settled = arriving.settled.get(node, np.zeros(count, np.bool_))
                 rows = np.flatnonzero(rest & settled)
                 irradiance[rows] = _irradiance(pairs, rows)
-                fill(seen.between, summed, rest, settled, terms, irradiance)
+                fill(seen.between, mesh.material, summed, rest, settled, terms, irradiance)
                 done = [np.where(rest, -1, version) for version in done]
             layers[node] = LayerRadiance(terms, irradiance)
             kept[node] = _Layer(layers[node], done)
