@@ -2,7 +2,8 @@
 
 `settle`: an object was dragged and stands where it began; how long until the refined picture is final, and
 how wrong that is: matte materials that Mitsuba has, `settle-glossy` with its metal, `settle-own` the room as
-it is, where only our own brute force can tell. `precompute`: everything with an empty cache folder, and with
+it is, where only our own brute force can tell, `settle-truer…` with the control further to truer and sixteen
+samples a pixel. `precompute`: everything with an empty cache folder, and with
 a full one. `memory`: visibility as it is held, `memory-working`: what one view's shading takes on top.
 """
 
@@ -10,6 +11,7 @@ from __future__ import annotations
 
 import dataclasses
 import time
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -27,15 +29,34 @@ if TYPE_CHECKING:
 PLACES = 1024
 TARGETS = (0.05, 0.03, 0.02)
 DRAGGED = 4
-SETTLES = {"settle": NATIVE["diffuse"], "settle-glossy": NATIVE["glossy"], "settle-own": OWN}
+
+
+@dataclass(frozen=True)
+class Settle:
+    """Materials, samples a pixel along each side, and the quality control (None: as it comes)."""
+
+    materials: str
+    antialias: int = 2
+    quality: float | None = None
+
+
+SETTLES = {
+    "settle": Settle(NATIVE["diffuse"]),
+    "settle-glossy": Settle(NATIVE["glossy"]),
+    "settle-own": Settle(OWN),
+    "settle-truer": Settle(NATIVE["diffuse"], 4, 0.75),
+    "settle-truer-glossy": Settle(NATIVE["glossy"], 4, 0.75),
+}
 
 
 def settle(suite: Suite, environment: str, case: str) -> None:
     """Antialiased, refined pictures at rest after a drag; `case` is one of SETTLES."""
-    name, materials = f"{prefix_of(environment)}{case}", SETTLES[case]
+    name, wanted = f"{prefix_of(environment)}{case}", SETTLES[case]
+    materials = wanted.materials
     base = suite.base(environment, materials)
-    rest = State(base.scene, dataclasses.replace(base.view, antialias=2))
-    moving, exact = suite.params(), suite.params(refine=True)
+    rest = State(base.scene, dataclasses.replace(base.view, antialias=wanted.antialias))
+    quality = {} if wanted.quality is None else {"quality": wanted.quality}
+    moving, exact = suite.params(**quality), suite.params(refine=True, **quality)
     found = Measured()
     for _ in range(suite.setup.settles):
         editor = Editor(suite.backend, suite.services)
