@@ -35,6 +35,7 @@ from studio_core.shading.pipeline import Inputs
 from studio_core.shading.primary import visible_vertices
 from studio_plugins.cuts import keeping
 from studio_plugins.cuts.choose import Prefix
+from studio_plugins.cuts.forecast import Forecast
 from studio_plugins.cuts.lamps import LampCache, Source, lamp_source, sphere
 from studio_plugins.cuts.light_cache import LightCache
 from studio_plugins.cuts.lobes import LobeTable
@@ -57,6 +58,8 @@ FIRST_LEVELS = (10, 12)
 COARSEST, FINEST = 11, 13
 SLOW, QUICK = 0.1, 0.035
 """Fineness of previews, and seconds of one after which the next is coarser, or finer."""
+LONG = 0.6
+"""Seconds of exact tracing that somebody who has let go of something is not left waiting for."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,6 +97,7 @@ class VisibilityStage:
         self._cache: DiskCache | None = services.cache
         self._store: VisibilityStore | None = None
         self._preview = FINEST - 1
+        self._forecast = Forecast()
         self._occluders = OccluderTable()
         self._asked: tuple[Surfaces, Occluders] | None = None
 
@@ -125,13 +129,10 @@ class VisibilityStage:
                 points = np.flatnonzero(core)
             self._look(points, job)
         else:
-            unknown = store.unknown(points)
-            if len(unknown) and job.listened_to and store.unseen(unknown):
-                for level in FIRST_LEVELS:
-                    if level < k:
-                        store.preview(points, level, job)
-                        job.publish(Seen(store, points, mask, False, level))
-            store.trace(points, job)
+            for level in self._steps(points, job):
+                store.preview(points, level, job)
+                job.publish(Seen(store, points, mask, False, level))
+            self._trace(points, job)
         exact = not len(store.unknown(points))
         exact = exact and between is None
         made = Seen(store, points, mask, exact, k if exact else self._preview, between)
@@ -166,6 +167,28 @@ class VisibilityStage:
         store.trace(rows, job)
         kept = keeping.save(self._cache, store, surfaces, occluders) if self._cache is not None else 0
         return {"vertices_traced": missing, "bytes": kept}
+
+    def _steps(self, points: I64, job: Job) -> tuple[int, ...]:
+        """Finenesses to show first, where somebody waits for it and exact tracing would take long."""
+        store = self._store
+        assert store is not None
+        unknown = store.unknown(points)
+        if not len(unknown) or not job.listened_to:
+            return ()
+        new = store.never(unknown)
+        if store.unseen(unknown):
+            levels: tuple[int, ...] = FIRST_LEVELS
+        else:
+            levels = (self._preview,) if self._forecast(new, len(unknown) - new) > LONG else ()
+        return tuple(level for level in levels if level < store.k)
+
+    def _trace(self, points: I64, job: Job) -> None:
+        store = self._store
+        assert store is not None
+        unknown = store.unknown(points)
+        new, started = store.never(unknown), time.perf_counter()
+        store.trace(points, job)
+        self._forecast.learn(new, len(unknown) - new, time.perf_counter() - started)
 
     def _look(self, points: I64, job: Job) -> None:
         assert self._store is not None

@@ -196,6 +196,10 @@ class VisibilityStore:
         """Whether of none of the points anything is known."""
         return not ((self.exact.epoch[points] != NEVER) | (self._coarse.epoch[points] != NEVER)).any()
 
+    def never(self, points: Points) -> int:
+        """Of how many of the points there is no exact record of any time."""
+        return int((self.exact.epoch[points] == NEVER).sum())
+
     def sources(self) -> Sources:
         """What to read for each vertex."""
         usable = (self._coarse.epoch == self._now) & ~self.current

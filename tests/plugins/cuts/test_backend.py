@@ -27,6 +27,7 @@ from studio_core.shading.job import Job
 from studio_core.shading.materials import coefficients, resolve
 from studio_core.shading.offline import backend_params, scene_view, shade
 from studio_core.shading.pipeline import Pipeline
+from studio_plugins.cuts import stages
 from studio_plugins.cuts.stages import Seen
 
 FAST = {"directions": "1024", "vertices": 700, "refine": False, "lamp_samples": 8}
@@ -608,11 +609,67 @@ def test_coarse_pictures_of_a_new_scene_come_first(host, services):
     job = Job("listened to", on_publish=published.append)
     view = scene_view(scene, None, 48, 36)
     final = pipeline.update(Frame(scene, view, params, 1), Changes(), job)
-    assert [made.directions for made in published] == [1 << 10, 1 << 12]
-    assert not any(made.final for made in published)
+    assert [made.directions for made in published] == [1 << 10, 1 << 12, 1 << 13]
+    assert [made.final for made in published] == [False, False, True]
     assert final.final
     assert final.directions == 8192
     for made in published:
         wrong = made.layers["sky"].irradiance - final.layers["sky"].irradiance
         mean = final.layers["sky"].irradiance[final.valid].mean()
         assert np.abs(wrong[final.valid]).mean() < 0.05 * mean
+
+
+@pytest.fixture
+def room(host, services):
+    """Directions enough for coarse ones to be coarser."""
+    return Bench(lit_scene(), host, services, directions="16384")
+
+
+def listening():
+    published: list[Radiance] = []
+    return published, Job("listened to", on_publish=published.append)
+
+
+def wrong(bench, made, exact):
+    """Of the sky's irradiance, in means of it."""
+    both = made.valid & exact.valid
+    away = made.layers["sky"].irradiance[both] - exact.layers["sky"].irradiance[both]
+    return np.sqrt((away**2).mean()) / exact.layers["sky"].irradiance[both].mean()
+
+
+@pytest.mark.parametrize("name", ["move", "add", "turn", "mesh"])
+def test_what_takes_long_is_seen_quickly_before_it_is_exact(room, monkeypatch, name):
+    monkeypatch.setattr(stages, "LONG", 0.0)
+    published, job = listening()
+    before = room.made
+    final = room.do(EDITS[name], job)
+    assert [made.final for made in published] == [False, True]
+    assert published[0].directions < final.directions
+    assert published[1] is final
+    assert (published[0].valid == final.valid).all()
+    assert 0 < wrong(room, published[0], final) < 0.02
+    assert before.final
+    room.assert_fresh()
+
+
+def test_after_a_release_the_first_picture_is_no_worse_than_the_last_moving_one(room, monkeypatch):
+    monkeypatch.setattr(stages, "LONG", 0.0)
+    monkeypatch.setattr(stages, "QUICK", 0.0)  # previews do not become finer meanwhile
+    monkeypatch.setattr(stages, "SLOW", 1e9)
+    moving = room.do(MOVE, moving=True)
+    rays = moving.counts["rays"]
+    published, job = listening()
+    final = room.update(view_changed(), job)
+    first = published[0]
+    assert not first.final
+    assert first.counts["rays"] == rays  # what was looked at while it moved is not looked at again
+    assert wrong(room, first, final) <= wrong(room, moving, final) * 1.0001
+    room.assert_fresh(exact=False)
+
+
+def test_what_takes_no_time_is_shown_exact_at_once(room, monkeypatch):
+    monkeypatch.setattr(stages, "LONG", 1e9)
+    published, job = listening()
+    final = room.do(MOVE, job)
+    assert [made.final for made in published] == [True]
+    assert published[0] is final
