@@ -121,6 +121,8 @@ class Suite:
             for prefix, method in self.methods.items():
                 editor = Editor(self.backend, self.services)
                 for environment in ENVIRONMENTS:
+                    if prefix and environment != ENVIRONMENTS[0] and cases is moves:
+                        continue  # minutes that tell nothing new of the paper's path
                     for case in cases:
                         name = f"{prefix}{prefix_of(environment)}{case.name}"
                         self.part(name, partial(self._case, name, editor, case, environment, method, cases))

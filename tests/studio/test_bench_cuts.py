@@ -391,6 +391,9 @@ def test_the_suite_has_every_promised_row(monkeypatch: pytest.MonkeyPatch, noisy
             for paper in ("", "paper/"):
                 name = f"{paper}{sun}{case.name}"
                 metrics = {metric for where, metric in found if where == name}
+                if paper and sun and case.name.startswith("move"):
+                    assert not metrics
+                    continue
                 assert {*TIMES, *ERRORS, "threads"} <= metrics, name
                 assert found[name, "vertex_rel_rmse"] < 1e-4, name  # the reference against itself
                 assert found[name, "picture_rel_rmse"] < 1e-4, name
