@@ -47,7 +47,7 @@ class Setup:
     checks: int = 2
     peer_edits: int = 6
     peer_exact: int = 3
-    samples: tuple[int, ...] = (4, 16, 100)
+    samples: tuple[int, ...] = (4, 16, 64)
     converged: int = 384
     settles: int = 1
     opens: int = 2
