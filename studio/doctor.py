@@ -11,6 +11,7 @@ from collections.abc import Callable
 from studio.display import why_no_window
 from studio.headless import Headless
 from studio_core import __version__
+from studio_ui.canvas.gl_report import ask
 
 NEEDED = ("numpy", "numba", "embreex", "trimesh", "OpenImageIO", "opencv-contrib-python-headless")
 WINDOW = ("PySide6-Essentials", "pyqtgraph", "vispy")
@@ -37,6 +38,9 @@ def doctor(options: argparse.Namespace, program: Headless) -> int:
     _try(note, "sample room", _sample)
     reason = why_no_window()
     note("window", "absent" if reason else "ok", reason)
+    if not reason:
+        canvas = ask()
+        note("graphics card", "ok" if canvas.hardware else "absent", canvas.renderer or canvas.reason)
     host = program.registry
     for kind in ("brdf", "backend", "importer", "exporter"):
         found = host.available(kind)

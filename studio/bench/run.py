@@ -11,7 +11,11 @@ from studio_core.errors import InputError
 
 EVERYTHING, FULL = "*", "full"
 SUITES = {
-    "bench": {"reference": "studio.bench.reference", "cuts": "studio.bench.cuts"},
+    "bench": {
+        "reference": "studio.bench.reference",
+        "cuts": "studio.bench.cuts",
+        "window": "studio.bench.window",
+    },
     "stress": {"ui": "studio.bench.stress_ui"},
 }
 

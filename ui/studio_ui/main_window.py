@@ -403,6 +403,7 @@ class MainWindow(QMainWindow):
             return
         self.layout_.keep()
         self.canvas.close()
+        self.viewport.release()
         self._autosave.stop()
         self._soon.stop()
         self.tools.close()

@@ -100,6 +100,10 @@ class BaseViewport(Hand):
         """The canvas as it is seen."""
         return self.grab().toImage()
 
+    def release(self) -> None:
+        """Hold on to no picture."""
+        self._picture = None
+
     def _picture_changed(self) -> None:
         self.update()
 

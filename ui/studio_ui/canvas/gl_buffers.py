@@ -12,8 +12,10 @@ from vispy import gloo
 F32 = npt.NDArray[np.float32]
 Bools = npt.NDArray[np.bool_]
 
-PAGE = 64
-"""Vertices that are uploaded together."""
+GAP = 8
+"""Unchanged vertices between changed ones that are uploaded with them, rather than in two pieces."""
+PIECES = 64
+"""With more of them larger gaps are filled."""
 GROWTH = 1.25
 
 
@@ -63,22 +65,20 @@ class Attribute:
             self.host = values
 
     def update(self, values: F32, known: Bools) -> None:
-        """Hold `values` (N, width) where they are `known`; pages that hold other ones are uploaded."""
-        old = self.host
-        if len(old) < len(values):
-            old = np.concatenate([old, self._unknown(values[len(old) :], known[len(old) :])])
-            fresh = np.zeros(len(values), np.bool_)
-            fresh[len(self.host) :] = True
-        else:
-            fresh = np.zeros(len(values), np.bool_)
-        part = old[: len(values)]
-        changed = known & (values != part).any(axis=1)
-        if changed.all() and len(part) == len(old):
-            self.host = values.copy()
-        else:
-            part[changed] = values[changed]
-            self.host = old
-        self._pages(changed | fresh)
+        """Hold `values` (N, width) where they are `known`; those that were other ones are uploaded."""
+        values = np.ascontiguousarray(values, np.float32)
+        count, held = len(values), len(self.host)
+        if held < count:
+            self.host = np.concatenate([self.host, self._unknown(values[held:], known[held:])])
+        part = self.host[:count]
+        different = values != part
+        changed = different[:, 0].copy()
+        for column in range(1, self.width):
+            changed |= different[:, column]
+        changed &= known
+        part[changed] = values[changed]
+        changed[held:] = True
+        self._pieces(changed)
 
     def _unknown(self, values: F32, known: Bools) -> F32:
         """What vertices that nothing is known of are shown with: the mean of the others."""
@@ -89,17 +89,19 @@ class Attribute:
         made[:] = mean
         return made
 
-    def _pages(self, changed: Bools) -> None:
-        count = len(changed)
-        if not changed.any():
+    def _pieces(self, changed: Bools) -> None:
+        """Upload what changed, in as few pieces as make sense."""
+        own = np.flatnonzero(changed)
+        if not len(own):
             return
-        if changed.all():
-            self._upload(self.host, 0, count)
-            return
-        touched = np.logical_or.reduceat(changed, np.arange(0, count, PAGE))
-        steps = np.flatnonzero(np.diff(np.concatenate([[False], touched, [False]]).astype(np.int8)))
-        for start, stop in steps.reshape(-1, 2).tolist():
-            self._upload(self.host, start * PAGE, min(stop * PAGE, count))
+        steps, gap = np.diff(own), GAP
+        while np.count_nonzero(steps > gap) > PIECES:
+            gap *= 2
+        ends = np.flatnonzero(steps > gap)
+        starts = own[np.concatenate([[0], ends + 1])]
+        stops = own[np.concatenate([ends, [len(own) - 1]])] + 1
+        for start, stop in zip(starts.tolist(), stops.tolist(), strict=True):
+            self._upload(self.host, start, stop)
 
     def _upload(self, values: F32, start: int, stop: int) -> None:
         if self.buffer is None:

@@ -37,6 +37,7 @@ F64 = npt.NDArray[np.float64]
 Rgb = tuple[float, float, float]
 KINDS = {"srgb": 0.0, "filmic": 1.0, "raw": 2.0}
 NEAREST = 2e-3  # metres
+NOTHING_BEHIND = 1e30  # metres
 CORNERS = np.array([(-1, -1), (1, -1), (-1, 1), (1, 1)], np.float32)
 
 
@@ -110,7 +111,7 @@ class Renderer:
         camera = Camera.of(look.view, self._near_far(look.view))
         gain = float(2.0**look.exposure)
         light = self._targets.light
-        light.begin((0.0, 0.0, 0.0, 1e30))
+        light.begin((0.0, 0.0, 0.0, NOTHING_BEHIND))
         if self._picture.colours is None:
             self._still.draw(self, self._picture, gain)
         else:
@@ -257,7 +258,7 @@ class Renderer:
         program = self._program("layer", *shaders.plain_program(shaders.LAYER_FRAGMENT))
         for number in range(LAYERS):
             layer = self._targets.layer(number)
-            layer.begin((0.0, 0.0, 0.0, 0.0))
+            layer.begin((0.0, 0.0, 0.0, NOTHING_BEHIND))
             gloo.set_state(depth_test=True, blend=False, depth_func="less")
             program["u_projection"] = camera.projection.T
             program["u_opaque"], program["u_before"] = self._targets.light.texture, before.texture
@@ -375,7 +376,8 @@ class Renderer:
             matrix = body.transform.matrix()
             centre = matrix[:3, :3] @ body.shape.centre + matrix[:3, 3]
             far = max(far, float(np.linalg.norm(centre - eye)) + body.shape.radius * body.transform.scale)
-        hits = self._picture.radiance.hits if self._picture is not None else None
+        shown = self._picture
+        hits = shown.radiance.hits if shown is not None and shown.colours is not None else None
         same = hits is not None and hits.view.transform == view.transform
         nearest = self._nearest if np.isfinite(self._nearest) else 1.0
         near = nearest * (0.8 if same else 0.1) / float(np.hypot(np.hypot(*extent(view)), 1))

@@ -174,7 +174,7 @@ uniform vec2 u_size;
 void main() {
     vec2 at = gl_FragCoord.xy / u_size;
     float away = length(v_eye);
-    if (away >= texture2D(u_opaque, at).a) discard;
+    if (away > texture2D(u_opaque, at).a * (1.0 + 1e-5)) discard;  // also before what it stands on
     if (away <= texture2D(u_before, at).a * (1.0 + 1e-5)) discard;
     gl_FragColor = vec4(0.0, 0.0, 0.0, away);
 }

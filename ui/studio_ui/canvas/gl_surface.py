@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from PySide6.QtCore import QTimer
+from PySide6.QtGui import QPaintEvent
 from PySide6.QtOpenGLWidgets import QOpenGLWidget
 from PySide6.QtWidgets import QWidget
 from vispy.gloo.context import FakeCanvas, forget_canvas
@@ -14,6 +15,8 @@ from studio_core.shading.artifacts import Picture
 from studio_ui.canvas.gl_buffers import Tally
 from studio_ui.canvas.gl_context import begin, largest_texture, names, surface_format
 from studio_ui.canvas.gl_renderer import Look, Picked, Renderer
+
+GL_RGBA8 = 0x8058
 
 
 class GlSurface(QOpenGLWidget):
@@ -43,6 +46,12 @@ class GlSurface(QOpenGLWidget):
     def tally(self) -> Tally:
         """What went to the GPU in this context."""
         return self._renderer.tally if self._renderer is not None else Tally()
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        """Qt makes the context when it first paints; without one it says nothing."""
+        super().paintEvent(event)
+        if not self.isValid():
+            self._fail(RuntimeError("Qt cannot make an OpenGL context"))
 
     def initializeGL(self) -> None:
         """A context is there: the first, or another one."""
@@ -113,6 +122,3 @@ class GlSurface(QOpenGLWidget):
             words = str(error).strip().splitlines()
             reason = words[0] if words else type(error).__name__
             QTimer.singleShot(0, self, lambda: self._tell(reason))
-
-
-GL_RGBA8 = 0x8058

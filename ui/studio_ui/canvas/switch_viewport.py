@@ -55,8 +55,14 @@ class SwitchViewport(QWidget):
             getattr(viewport, name)(*values)
         if focused:
             viewport.widget.setFocus()
+        old.release()
         old.widget.hide()
         old.widget.deleteLater()
+
+    def release(self) -> None:
+        """Give everything back."""
+        self.inner.release()
+        self._told.clear()
 
     def _put_in(self, viewport: Viewport) -> None:
         for name in _SIGNALS:

@@ -113,3 +113,7 @@ class Viewport(Protocol):
     def grab_image(self) -> QImage:
         """The canvas as it is seen."""
         ...
+
+    def release(self) -> None:
+        """Give everything back: this canvas is not shown any more."""
+        ...

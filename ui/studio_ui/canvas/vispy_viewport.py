@@ -81,6 +81,11 @@ class VispyViewport(BaseViewport):
             return Probe(None, float("inf"), (0.0, 0.0, 0.0))
         return Probe(picture.nodes[found.object], found.distance, found.radiance)
 
+    def release(self) -> None:
+        """Give everything back to the GPU: contexts share what they hold, so that it outlives them."""
+        super().release()
+        self.surface.release()
+
     def grab_image(self) -> QImage:
         """The canvas as it is seen."""
         image = self.surface.grabFramebuffer()
