@@ -19,7 +19,7 @@ import numpy.typing as npt
 from studio.bench.cuts_cases import Case, State
 from studio.bench.cuts_measure import Editor
 from studio.bench.cuts_peers import Peer
-from studio.bench.cuts_scenes import NATIVE
+from studio.bench.cuts_scenes import ENVIRONMENTS, NATIVE
 from studio.bench.harness import Timing
 
 if TYPE_CHECKING:
@@ -50,15 +50,18 @@ ROUGH = Point("rough", False, 1, refined=False)
 FINEST = Point("finest", False, 4)
 
 
-def points(case: Case) -> tuple[Point, ...]:
-    """Where a case is measured, first as it is against brute force.
+def points(case: Case, environment: str) -> tuple[Point, ...]:
+    """Where a case is measured, first as it is against brute force; under the sun, fewer.
 
     A moved object at rest is a case of its own. Sixteen samples a pixel pay where the rays to them stay.
     """
+    everything = environment == ENVIRONMENTS[0]
     if not case.moving:
-        return (ROUGH, REST, FINEST)
+        return (ROUGH, REST, FINEST) if everything else (ROUGH,)
     if case.name.startswith("move"):
-        return (PLAIN, MOVING, SMOOTH)
+        return (PLAIN, MOVING, SMOOTH) if everything else (PLAIN, SMOOTH)
+    if not everything:
+        return (PLAIN, SMOOTH, REST)
     return (PLAIN, MOVING, SMOOTH, *(() if case.name == "camera" else (FINE,)), REST)
 
 
@@ -69,7 +72,7 @@ def against_peer(suite: Suite, name: str, case: Case, environment: str) -> None:
     if peer is None:
         return
     best: tuple[float, float, Point] | None = None
-    for point in points(case):
+    for point in points(case, environment):
         editor = suite.settled_editor(environment, case, point.refined)
         linear, timing = edited(suite, editor, case, environment, point)
         error = peer.error(linear)

@@ -401,7 +401,7 @@ def test_the_suite_has_every_promised_row(monkeypatch: pytest.MonkeyPatch, noisy
                 assert found[name, "picture_ms"] >= found[name, "compose_ms"] > 0
                 compared = not paper and not case.everywhere
                 assert ("peer_picture_rel_rmse" in metrics) == compared
-                for point in points(case) if compared else ():
+                for point in points(case, "sun" if sun else "windows") if compared else ():
                     assert found[name, f"peer_{point.name}_ms"] > 0
                     assert found[name, "peer_ratio"] >= found[name, f"peer_{point.name}_ratio"] > 0
                 assert report.details[name]["seconds"] >= 0
