@@ -143,6 +143,7 @@ def switching(bench: Bench) -> dict[str, Any]:
         "agree": same(first, second),
         "on_screen": same(second, shown),
         "back": bool(np.array_equal(first, third)),
+        "ratio": bench.inner.devicePixelRatioF(),
         "log": bench.log(),
     }
 

@@ -116,6 +116,10 @@ class BaseViewport(Hand):
     def _marks_changed(self) -> None:
         self.update()
 
+    def _rim(self, across: int) -> int:
+        """Pixels of an outline, of a picture with so many across: two logical ones in a large canvas."""
+        return max(1, round((2 if self.width() > 700 else 1) * across / max(self.width(), 1)))
+
     def _paint_marks(self, painter: QPainter) -> None:
         """What lies over the picture."""
         size = QSizeF(self.size())

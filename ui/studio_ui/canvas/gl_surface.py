@@ -73,7 +73,7 @@ class GlSurface(QOpenGLWidget):
             if not self.context().isValid():
                 raise RuntimeError("the graphics card was reset")
             ratio = self.devicePixelRatioF()
-            found = self._content(round(self.width() * ratio), round(self.height() * ratio))
+            found = self._content(int(self.width() * ratio + 0.5), int(self.height() * ratio + 0.5))
             if found is None:
                 return
             begin(self._canvas, self.defaultFramebufferObject())

@@ -36,9 +36,9 @@ class Hand(QWidget):
         self.setAccessibleName("Picture")
 
     def device_size(self) -> tuple[int, int]:
-        """Width and height in device pixels."""
+        """Width and height in device pixels, as Qt rounds them for what it draws into: halves up."""
         ratio = self.devicePixelRatioF()
-        return round(self.width() * ratio), round(self.height() * ratio)
+        return int(self.width() * ratio + 0.5), int(self.height() * ratio + 0.5)
 
     def sizeHint(self) -> QSize:
         """Some room to start with."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
+from PySide6.QtCore import QPointF
 from PySide6.QtGui import QColor, QImage, QPainter, QPaintEvent
 from PySide6.QtWidgets import QWidget
 
@@ -51,27 +52,31 @@ class RasterViewport(BaseViewport):
             chosen = np.array([n in self._selection for n in self._picture.nodes] + [False])
             mask = chosen[self._picture.node]
             if mask.any():
-                self._outline = _image(outline(mask), QColor(self._theme.accent))
+                rim = self._rim(mask.shape[1])
+                self._outline = _image(outline(mask, rim), QColor(self._theme.accent))
         self.update()
 
     def paintEvent(self, event: QPaintEvent) -> None:
         """The picture, then marks."""
         painter = QPainter(self)
         painter.fillRect(self.rect(), QColor(self._theme.canvas))
-        room = self.target()
-        if self._image is not None:
-            painter.setRenderHint(QPainter.RenderHint.SmoothPixmapTransform)
-            painter.drawImage(room, self._image)
-            if self._outline is not None:
-                painter.drawImage(room, self._outline)
+        painter.setRenderHint(QPainter.RenderHint.SmoothPixmapTransform)
+        for image in (self._image, self._outline):
+            if image is None:
+                continue
+            if (image.width(), image.height()) == self.device_size():  # pixel by pixel, at any scale
+                image.setDevicePixelRatio(self.devicePixelRatioF())
+                painter.drawImage(QPointF(), image)
+            else:
+                painter.drawImage(self.target(), image)
         self._paint_marks(painter)
         painter.end()
 
 
-def outline(mask: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
-    """(H, W) pixels just outside the mask, `rim` wide."""
+def outline(mask: npt.NDArray[np.bool_], rim: int = 1) -> npt.NDArray[np.bool_]:
+    """(H, W) pixels just outside the mask, at most `rim` steps away."""
     grown = mask.copy()
-    for _ in range(rim(mask.shape[1])):
+    for _ in range(rim):
         wide = grown.copy()
         wide[1:] |= grown[:-1]
         wide[:-1] |= grown[1:]
@@ -79,11 +84,6 @@ def outline(mask: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
         wide[:, :-1] |= grown[:, 1:]
         grown = wide
     return grown & ~mask
-
-
-def rim(width: int) -> int:
-    """Pixels of an outline in a picture so wide."""
-    return 2 if width > 700 else 1
 
 
 def _image(mask: npt.NDArray[np.bool_], colour: QColor) -> QImage:

@@ -117,7 +117,7 @@ class VispyViewport(BaseViewport):
 
     def _content(self, width: int, height: int) -> tuple[Picture | None, Look] | None:
         """What the surface is to draw."""
-        theme, ratio = self._theme, self.devicePixelRatioF()
+        theme = self._theme
         smooth = 4 * width * height <= SMOOTH_SAMPLES
         if self._slow() and self.freshness not in _STILL:
             smooth = False
@@ -128,7 +128,7 @@ class VispyViewport(BaseViewport):
             self._exposure,
             self._tonemap,
             self._selection,
-            max(1, round(ratio * (2 if width > 700 * ratio else 1))),
+            self._rim(width),
             (accent.redF(), accent.greenF(), accent.blueF()),
             GRID if self._grid else None,
             (ground.redF(), ground.greenF(), ground.blueF()),
