@@ -134,8 +134,8 @@ def run_window(path: Path | None, *, read_only: bool = False) -> int:
         studio = assemble(settings=settings)
         before, sys.excepthook = sys.excepthook, _hook(studio.context.journal)
         try:
-            studio.window.show()
             studio.window.canvas.start()
+            studio.window.show()
             if crashed:
                 studio.context.journal.write(
                     "The program crashed last time; its report is here.", "warning", crashed

@@ -44,7 +44,7 @@ from studio_core.shading.job import Job
 from studio_core.shading.lamps import shown_environment
 from studio_core.shading.materials import linear_rgb
 from studio_core.shading.pipeline import Inputs
-from studio_core.shading.primary import eye_in, pinhole
+from studio_core.shading.primary import eye_in, pinhole, visible_vertices
 
 F32 = npt.NDArray[np.float32]
 I32 = npt.NDArray[np.int32]
@@ -148,6 +148,7 @@ class Compositor:
         self._outline: Kept[_Outline] = Kept()
         self._background: Kept[F32] = Kept()
         self._sky: Kept[F32] = Kept()
+        self._corners: Kept[npt.NDArray[np.bool_]] = Kept()
 
     def picture(
         self, scene: Scene, radiance: Radiance, hits: Hits, table: Coefficients, job: Job | None = None
@@ -174,7 +175,8 @@ class Compositor:
             values = self._hits(layer.hits, faces, tables, job)
             add_samples(layer.samples, hits.samples**2, layer.weight, values, out)
         linear = out.reshape(view.height, view.width, 3)
-        colours = VertexColours(tables.record, tables.sums, table.maps, backdrop)
+        corners = self._corners(lambda: visible_vertices(surfaces, hits), hits, mesh)
+        colours = VertexColours(tables.record, tables.sums, corners, table.maps, backdrop)
         return Picture(radiance, linear, outline.coverage, outline.node, outline.distance, colours)
 
     def radiance(

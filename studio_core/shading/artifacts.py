@@ -223,11 +223,13 @@ class VertexColours:
     """What a picture interpolates, for canvases that do so themselves.
 
     record (V, 8), sums (V or 0, TERMS·3) and maps as in `kernels.compose.shade_hits`; they hold where
-    `Radiance.valid`. `backdrop` is None where none is shown.
+    `Radiance.valid`. `shown` (V,) are the corners of what the picture shows; others may be turned away from
+    its eye, and black. `backdrop` is None where none is seen.
     """
 
     record: F32
     sums: F32
+    shown: npt.NDArray[np.bool_]
     maps: Maps
     backdrop: Backdrop | None
 

@@ -98,9 +98,16 @@ class Bench:
             if time.monotonic() > end:
                 raise TimeoutError(f"{what} did not come about")
 
+    def remembered(self) -> str:
+        """What is tried at the next start without asking."""
+        return str(self.settings.get("canvas_card", ""))
+
     def gpu(self) -> None:
         self.window.canvas.prefer("gpu")
-        self.wait(lambda: self.window.canvas.shown == "gpu" and self.inner.surface.frames > 0)
+        self.wait(lambda: self.window.canvas.shown == "gpu")
+        for _ in range(2):  # Qt makes the window anew for its first OpenGL, and the context with it
+            QTest.qWait(40)
+            self.wait(lambda: self.inner.tally.draws > 0)
 
     def grab(self) -> np.ndarray:
         QTest.qWait(50)
@@ -143,6 +150,7 @@ def switching(bench: Bench) -> dict[str, Any]:
         "agree": same(first, second),
         "on_screen": same(second, shown),
         "back": bool(np.array_equal(first, third)),
+        "remembered": bench.remembered(),
         "ratio": bench.inner.devicePixelRatioF(),
         "log": bench.log(),
     }
@@ -275,6 +283,7 @@ def lost(bench: Bench) -> dict[str, Any]:
         "frames": frames,
         "fell_back": same(first, third),
         "log": bench.log(),
+        "remembered": bench.remembered(),
         "trying": bench.settings.get("canvas_trying", False),
     }
 

@@ -112,6 +112,22 @@ def test_a_canvas_that_ended_the_program_is_not_tried_again(chooser: Chooser) ->
     assert chooser.tried == 1
 
 
+@pytest.mark.parametrize(
+    ("report", "preference", "asked"),
+    [(CARD, "auto", False), (LLVMPIPE, "auto", True), (LLVMPIPE, "gpu", False)],
+)
+def test_what_has_drawn_is_used_at_once(
+    report: GlReport, preference: str, asked: bool, chooser: Chooser
+) -> None:
+    chooser.settings.set("canvas", preference)
+    chooser.choice._drawn(report.renderer)
+    chooser.reports(report)
+    chooser.choice.start()
+    assert (chooser.choice._process is not None) == asked
+    assert chooser.tried == (not asked)
+    chooser.settle()
+
+
 def test_closing_does_not_wait_for_an_answer(chooser: Chooser) -> None:
     chooser.answer("import time; time.sleep(60)")
     chooser.choice.start()

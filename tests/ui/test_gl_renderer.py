@@ -248,7 +248,8 @@ def test_a_buffer_holds_what_is_known_and_moves_little(data: st.DataObject) -> N
         known = data.draw(arrays(np.bool_, count))
         changed = known & (values != truth[:count]).any(axis=1)
         truth[:count][known] = values[known]
-        fresh = max(0, count - len(attribute.host))
+        guessed = not attribute._seen and known.any()
+        fresh = count if guessed else max(0, count - len(attribute.host))
         before = tally.copy()
         attribute.update(values, known)
         moved = tally.since(before)
@@ -299,6 +300,23 @@ def test_what_is_not_known_stays_as_it_was(screen: Any, painter: Painter) -> Non
     assert np.array_equal(before, after)
 
 
+def test_a_view_ahead_of_its_picture_has_no_holes(screen: Any, painter: Painter) -> None:
+    """From behind, where the picture has seen nothing, and what it knows there is black."""
+    scene = SCENES["plain"]
+    picture = painter.paint(scene, VIEW)
+    assert picture.colours is not None
+    dark = np.where(picture.radiance.valid[:, None], picture.colours.record, 0)
+    everywhere = dataclasses.replace(picture.radiance, valid=np.ones_like(picture.radiance.valid))
+    colours = dataclasses.replace(picture.colours, record=dark.astype(np.float32))
+    picture = dataclasses.replace(picture, radiance=everywhere, colours=colours)
+    drawn(screen, None, VIEW)
+    assert agreement(drawn(screen, picture, VIEW), tonemap(picture.linear), edges(picture)) >= 0.99
+    behind = sized(VIEW, transform=looking((-1.6, 1.5, -2.6), (0.0, 0.4, 0.0)))
+    made = drawn(screen, picture, behind)
+    solid = painter.paint(scene, behind).coverage == 1
+    assert (made[solid].max(axis=1) < 20).mean() < 0.01
+
+
 def test_moving_uploads_no_shapes(screen: Any, painter: Painter) -> None:
     scene = SCENES["plain"]
     uploaded(screen, painter.paint(scene, VIEW))
@@ -343,7 +361,9 @@ def with_mesh(picture: Picture, mesh: ShadingMesh) -> Picture:
         valid=np.ones(len(world), np.bool_),
     )
     return dataclasses.replace(
-        picture, radiance=radiance, colours=dataclasses.replace(colours, record=record)
+        picture,
+        radiance=radiance,
+        colours=dataclasses.replace(colours, record=record, shown=np.ones(len(world), np.bool_)),
     )
 
 
@@ -411,3 +431,17 @@ def test_environments_too_large_for_the_driver(screen: Any, painter: Painter) ->
     finally:
         renderer._largest = kept
     assert agreement(made, tonemap(picture.linear), edges(picture)) >= 0.99
+
+
+def test_guesses_give_way_to_what_is_known(screen: Any) -> None:
+    from studio_ui.canvas.gl_buffers import Attribute, Tally
+
+    attribute = Attribute(3, Tally(), "colours")
+    attribute.resize(4)
+    values = np.full((4, 3), 0.8, np.float32)
+    attribute.update(values, np.zeros(4, np.bool_), np.full(3, 0.3, np.float32))
+    assert (attribute.host == np.float32(0.3)).all()
+    attribute.update(values, np.array([True, False, False, False]))
+    assert (attribute.host == np.float32(0.8)).all(), "what is not known yet looks like the rest of it"
+    attribute.update(values / 2, np.array([False, True, False, False]))
+    assert attribute.host[:, 0].tolist() == pytest.approx([0.8, 0.4, 0.8, 0.8])

@@ -77,6 +77,7 @@ def test_canvases_change_while_the_program_runs(scale: str, play: Play) -> None:
     assert found["agree"] >= 0.99, "grid, outline, badge and lines over it included"
     assert found["on_screen"] >= 0.99, "what was grabbed is what the display shows"
     assert found["back"]
+    assert found["remembered"], "the next start needs not ask"
     assert found["log"] == []
 
 
@@ -115,4 +116,4 @@ def test_a_lost_context_and_a_driver_that_fails(play: Play) -> None:
     assert found["again"] == 1.0
     assert found["fell_back"] >= 0.99
     assert found["log"] == ["The canvas is drawn without the graphics card: out of memory."]
-    assert not found["trying"]
+    assert (found["trying"], found["remembered"]) == (False, "")

@@ -1,8 +1,8 @@
 """Which canvas is shown: the GPU's where a graphics card draws, or what a person prefers.
 
 `LUCARNE_CANVAS` (auto, gpu, software) comes before the preference. What OpenGL can do is asked in a child
-process while the window is up already. That the canvas is being tried is remembered until it has drawn: a
-driver that ends the program does so once.
+process while the window is up already; what has drawn once is used at once the next time. That the canvas is
+being tried is remembered until it has drawn: a driver that ends the program does so once.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ AUTO, GPU, SOFTWARE = PREFERENCES = ("auto", "gpu", "software")
 VARIABLE = "LUCARNE_CANVAS"
 HIDDEN = ("offscreen", "minimal")
 """Qt's platforms that have no OpenGL."""
-_TRYING, _PREFERRED = "canvas_trying", "canvas"
+_TRYING, _PREFERRED, _CARD = "canvas_trying", "canvas", "canvas_card"
 Say = Callable[[str, Level], None]
 
 
@@ -52,7 +52,9 @@ class CanvasChoice:
         return SOFTWARE if isinstance(self._viewport.inner, RasterViewport) else GPU
 
     def start(self) -> None:
-        """Follow the preference."""
+        """Follow the preference; before the window is shown, where that can be."""
+        if self.shown == GPU:
+            return
         platform = QGuiApplication.platformName()
         if self.preference == SOFTWARE:
             return
@@ -61,9 +63,14 @@ class CanvasChoice:
                 self._fall_back(f"Qt's {platform} platform has no OpenGL")
             return
         if self._settings.get(_TRYING, False) and self.preference == AUTO:
+            self._settings.set(_CARD, None)
             self._fall_back("the program ended while it was being tried last time")
             return
-        self._ask()
+        known = GlReport(True, self._settings.get(_CARD, ""))
+        if known.renderer and (known.hardware or self.preference == GPU):
+            self._try()
+        else:
+            self._ask()
 
     def prefer(self, preference: str) -> None:
         """Another preference, remembered, and followed at once."""
@@ -133,15 +140,18 @@ class CanvasChoice:
             return
         self._settings.set(_TRYING, True)
         made = VispyViewport(self._failed)
-        made.surface.frameSwapped.connect(self._drawn)
+        surface = made.surface
+        surface.frameSwapped.connect(lambda: surface.tally.draws and self._drawn(surface.drawn_by))
         self._show(made)
 
-    def _drawn(self) -> None:
+    def _drawn(self, renderer: str) -> None:
         self._settings.set(_TRYING, None)
+        self._settings.set(_CARD, renderer)
 
     def _failed(self, reason: str) -> None:
         """The GPU canvas draws no more."""
         self._settings.set(_TRYING, None)
+        self._settings.set(_CARD, None)
         if self.shown == GPU:
             self._show(RasterViewport())
         self._fall_back(reason)

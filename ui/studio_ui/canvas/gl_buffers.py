@@ -45,6 +45,7 @@ class Attribute:
     def __init__(self, width: int, tally: Tally, what: str) -> None:
         self.width, self._tally, self._what = width, tally, what
         self.host: F32 = np.zeros((0, width), np.float32)
+        self._seen = False  # whether anything was ever known
         self.buffer: Any = None
         self.room = 0
 
@@ -64,12 +65,17 @@ class Attribute:
         if first < common or len(values) >= len(self.host):
             self.host = values
 
-    def update(self, values: F32, known: Bools) -> None:
-        """Hold `values` (N, width) where they are `known`; those that were other ones are uploaded."""
+    def update(self, values: F32, known: Bools, typical: F32 | None = None) -> None:
+        """Hold `values` (N, width) where they are `known`; those that were other ones are uploaded.
+
+        New vertices of which nothing is known get the mean of the others, or `typical` (width,).
+        """
         values = np.ascontiguousarray(values, np.float32)
+        if not self._seen and known.any():
+            self._seen, self.host = True, self.host[:0]  # what was there were guesses
         count, held = len(values), len(self.host)
         if held < count:
-            self.host = np.concatenate([self.host, self._unknown(values[held:], known[held:])])
+            self.host = np.concatenate([self.host, self._unknown(values[held:], known[held:], typical)])
         part = self.host[:count]
         different = values != part
         changed = different[:, 0].copy()
@@ -80,13 +86,15 @@ class Attribute:
         changed[held:] = True
         self._pieces(changed)
 
-    def _unknown(self, values: F32, known: Bools) -> F32:
-        """What vertices that nothing is known of are shown with: the mean of the others."""
-        mean = values[known].mean(axis=0) if known.any() else np.full(self.width, np.nan, np.float32)
-        if not np.isfinite(mean).all():
-            mean = self.host.mean(axis=0) if len(self.host) else np.zeros(self.width, np.float32)
-        made = np.empty_like(values)
-        made[:] = mean
+    def _unknown(self, values: F32, known: Bools, typical: F32 | None) -> F32:
+        """What vertices that nothing is known of are shown with: see `update`."""
+        made = np.zeros_like(values)
+        if known.any():
+            made[:] = values[known].mean(axis=0)
+        elif len(self.host):
+            made[:] = self.host.mean(axis=0)
+        elif typical is not None:
+            made[:] = typical
         return made
 
     def _pieces(self, changed: Bools) -> None:
@@ -122,3 +130,4 @@ class Attribute:
         if self.buffer is not None:
             self.buffer.delete()
         self.buffer, self.host = None, np.zeros((0, self.width), np.float32)
+        self._seen = False

@@ -87,6 +87,7 @@ class GlScene:
         self.atlases = Atlases(tally, largest_texture)
         self._shapes: dict[int, Shape] = {}  # by identity of the mesh, which the shape holds
         self._picture: Picture | None = None
+        self._typical = np.zeros(3, np.float32)
 
     @property
     def layered(self) -> bool:
@@ -106,6 +107,7 @@ class GlScene:
             return
         mesh, colours = picture.radiance.surfaces.mesh, picture.colours
         self.atlases.update(colours.maps)
+        self._typical = _typical(picture)
         wanted = {id(placed.mesh) for placed in mesh.objects}
         old = dict(zip(self.nodes, self.bodies, strict=True))
         bodies = []
@@ -207,20 +209,33 @@ class GlScene:
         colours = picture.colours
         assert colours is not None
         own = picture.radiance.surfaces.mesh.vertices_of(index)
-        known = picture.radiance.valid[own]
         kinds = {batch.kind for batch in body.batches}
-        record = colours.record[own]
+        record, sums = colours.record[own], colours.sums[own]
         wanted = [(body.plain, record[:, 0:3])]
         if AFFINE in kinds:
             wanted.append((body.slope, record[:, 3:6]))
         if GENERAL in kinds:
-            sums = colours.sums[own]
             wanted += [(body.sums[k], sums[:, 3 * k : 3 * k + 3]) for k in range(3)]
+        known = picture.radiance.valid[own].copy()
+        hidden = np.flatnonzero(known & ~colours.shown[own])
+        if len(hidden):  # what is turned away is black; who turns the view wants to see something better
+            lit = np.zeros(len(hidden), np.bool_)
+            for _, values in wanted:
+                lit |= values[hidden].any(axis=1)
+            known[hidden] = lit
         for attribute, values in wanted:
             attribute.resize(body.shape.positions.room)
-            attribute.update(values, known)
+            attribute.update(values, known, self._typical if attribute is body.plain else None)
 
 
 def _delete(body: Body) -> None:
     for attribute in body.colours():
         attribute.delete()
+
+
+def _typical(picture: Picture) -> F32:
+    """A colour for objects of which nothing is known: the mean of some that are shown."""
+    colours = picture.colours
+    assert colours is not None
+    some = np.flatnonzero(colours.shown & picture.radiance.valid)[::64]
+    return colours.record[some, :3].mean(axis=0) if len(some) else np.zeros(3, np.float32)
