@@ -216,13 +216,12 @@ class GlScene:
             wanted.append((body.slope, record[:, 3:6]))
         if GENERAL in kinds:
             wanted += [(body.sums[k], sums[:, 3 * k : 3 * k + 3]) for k in range(3)]
-        known = picture.radiance.valid[own].copy()
-        hidden = np.flatnonzero(known & ~colours.shown[own])
-        if len(hidden):  # what is turned away is black; who turns the view wants to see something better
-            lit = np.zeros(len(hidden), np.bool_)
-            for _, values in wanted:
-                lit |= values[hidden].any(axis=1)
-            known[hidden] = lit
+        known, shown = picture.radiance.valid[own], colours.shown[own]
+        if not shown.all():  # what is turned away is black; who turns the view wants to see something better
+            lit = shown.copy()
+            for column in (column for _, values in wanted for column in values.T):
+                lit |= column != 0
+            known = known & lit
         for attribute, values in wanted:
             attribute.resize(body.shape.positions.room)
             attribute.update(values, known, self._typical if attribute is body.plain else None)
