@@ -127,13 +127,20 @@ class RayCaster:
             self._objects.append(shared)
         self._transforms = [affine(item.transform, item.key) for item in objects]
         self._keys = [item.key for item in objects]
-        lows, highs = self._bounds()
-        self.centre: F64 = (lows + highs) / 2
+        self._parts: dict[int, CasterPart] = {}
+        self._lows, self._highs = np.full((len(objects), 3), np.inf), np.full((len(objects), 3), -np.inf)
+        for index in range(len(objects)):
+            self._bound(index)
+        low, high = self._bounds()
+        self.centre: F64 = (low + high) / 2
         self._open: Scene | None = self._device.scene(
             [shared.mesh for shared in self._objects], [self._placed(i) for i in range(len(objects))]
         )
         self._collect_faces()
-        self._refresh()
+        self._normals = np.zeros((len(objects), 3, 3), np.float32)
+        for index in range(len(objects)):
+            self._turn(index)
+        self._measure()
 
     def __enter__(self) -> RayCaster:
         return self
@@ -161,7 +168,10 @@ class RayCaster:
         scene = self._scene
         self._transforms[index] = affine(transform, self._keys[index])
         scene.move(index, self._placed(index))
-        self._refresh()
+        self._parts.pop(index, None)
+        self._bound(index)
+        self._turn(index)
+        self._measure()
 
     def local(self, points: npt.ArrayLike) -> F32:
         """World points (…, 3) as the tracers see them: float32 relative to `centre`."""
@@ -188,6 +198,11 @@ class RayCaster:
 
     def part(self, index: int) -> CasterPart:
         """An object by itself; ask again after a move. Only uniform scales."""
+        if index not in self._parts:
+            self._parts[index] = self._alone(index)
+        return self._parts[index]
+
+    def _alone(self, index: int) -> CasterPart:
         shared, transform = self._objects[index], self._transforms[index]
         linear = transform[:3, :3]
         scale = float(np.cbrt(abs(np.linalg.det(linear))))
@@ -284,16 +299,18 @@ class RayCaster:
             raise ValueError(f"rays need (N, 3) origins and directions, not {starts.shape} and {along.shape}")
         return starts, along, np.ascontiguousarray(np.broadcast_to(far, (len(starts),)))
 
+    def _bound(self, index: int) -> None:
+        shared, transform = self._objects[index], self._transforms[index]
+        if shared.mesh is not None:
+            middle = transform[:3, :3] @ shared.middle + transform[:3, 3]
+            reach = np.abs(transform[:3, :3]) @ shared.half
+            self._lows[index], self._highs[index] = middle - reach, middle + reach
+
     def _bounds(self) -> tuple[F64, F64]:
-        lows, highs = np.full(3, np.inf), np.full(3, -np.inf)
-        for shared, transform in zip(self._objects, self._transforms, strict=True):
-            if shared.mesh is not None:
-                middle = transform[:3, :3] @ shared.middle + transform[:3, 3]
-                reach = np.abs(transform[:3, :3]) @ shared.half
-                lows, highs = np.minimum(lows, middle - reach), np.maximum(highs, middle + reach)
-        if not np.isfinite(lows).all():
+        low, high = self._lows.min(axis=0, initial=np.inf), self._highs.max(axis=0, initial=-np.inf)
+        if not np.isfinite(low).all():
             return np.zeros(3), np.zeros(3)
-        return lows, highs
+        return low, high
 
     def _placed(self, index: int) -> F64 | None:
         """3×4 matrix from the mesh around its middle to the scene around its centre; None if flat."""
@@ -319,12 +336,13 @@ class RayCaster:
             self._face_start[index] = begin, begin + shared.opaque
         self._face_ids = np.concatenate([*tables, np.zeros(1, np.int32)])
 
-    def _refresh(self) -> None:
-        lows, highs = self._bounds()
-        largest = max(float(np.abs(lows - self.centre).max()), float(np.abs(highs - self.centre).max()), 1e-6)
+    def _measure(self) -> None:
+        low, high = self._bounds()
+        largest = max(float(np.abs(low - self.centre).max()), float(np.abs(high - self.centre).max()), 1e-6)
         self.epsilon = EPSILON_ULPS * float(np.spacing(np.float32(largest)))
-        self._normals = np.zeros((len(self._objects), 3, 3), np.float32)
-        for index, transform in enumerate(self._transforms):
-            if self._placed(index) is not None:
-                inverse = np.linalg.inv(transform[:3, :3]).T
-                self._normals[index] = inverse / np.abs(inverse).max()
+
+    def _turn(self, index: int) -> None:
+        self._normals[index] = 0
+        if self._placed(index) is not None:
+            inverse = np.linalg.inv(self._transforms[index][:3, :3]).T
+            self._normals[index] = inverse / np.abs(inverse).max()

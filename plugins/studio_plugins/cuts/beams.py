@@ -14,7 +14,8 @@ F32 = npt.NDArray[np.float32]
 F64 = npt.NDArray[np.float64]
 I64 = npt.NDArray[np.int64]
 
-_BLOCKS = (4096, 512, 64, 8)
+BLOCKS = (4096, 512, 64, 8)
+"""Sizes of the blocks of leaves that cones are put about."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,7 +38,7 @@ def _blocks(directions: DirectionSet) -> tuple[F32, F32, I64]:
     """Axes and cosines of the cones about blocks of leaves, and where each size starts."""
     cones, size = directions.cones, directions.size
     rows, offsets, at = [], [], 0
-    for block in _BLOCKS:
+    for block in BLOCKS:
         count = max(size // block, 1)
         offsets.append(at)
         rows.append(np.arange(count, 2 * count))
@@ -50,24 +51,37 @@ class BeamTable:
     """Keeps the directions turned for each rotation in use."""
 
     def __init__(self) -> None:
-        self._kept: dict[tuple[int, bytes], tuple[F32, F32]] = {}
+        self._k = 0
+        self._row: dict[bytes, int] = {}
+        self._rows = np.zeros((0, 0, 3, 8), np.float32)
+        self._axes = np.zeros((0, 0, 3), np.float32)
 
     def __call__(self, k: int, rotations: F64) -> tuple[Beams, I64]:
-        """Beams for the rotations world → object (n, 3, 3), and which row each object uses."""
+        """Beams for the rotations world → object (n, 3, 3), and which row each object uses.
+
+        Rows are changed in place by the next call.
+        """
         directions = direction_set(k)
         axes, cosine, offset = _blocks(directions)
-        kept: dict[tuple[int, bytes], tuple[F32, F32]] = {}
-        which: list[int] = []
-        for rotation in [np.eye(3), *rotations]:
-            key = (k, (np.round(rotation, 12) + 0.0).tobytes())
-            if key not in kept:
-                kept[key] = self._kept.get(key) or _turned(directions.directions, axes, rotation)
-            which.append(list(kept).index(key))
-        self._kept = {k_: v for k_, v in self._kept.items() if k_[0] != k} | kept
+        turns = np.concatenate([np.eye(3)[None], np.asarray(rotations, np.float64).reshape(-1, 3, 3)])
+        keys = [turn.tobytes() for turn in np.round(turns, 12) + 0.0]
+        wanted = dict(zip(keys, turns, strict=True))
+        if k != self._k or len(wanted) > len(self._rows):
+            room = 2 * len(wanted)
+            self._k, self._row = k, {}
+            self._rows = np.empty((room, max(directions.size // 8, 1), 3, 8), np.float32)
+            self._axes = np.empty((room, len(axes), 3), np.float32)
+        self._row = {key: row for key, row in self._row.items() if key in wanted}
+        free = sorted(set(range(1, len(self._rows))) - set(self._row.values()))
+        for key, turn in wanted.items():
+            if key not in self._row:
+                row = 0 if key == keys[0] else free.pop()
+                self._rows[row], self._axes[row] = _turned(directions.directions, axes, turn)
+                self._row[key] = row
         sine = np.sqrt(np.maximum(1 - cosine.astype(np.float64) ** 2, 0)).astype(np.float32)
         sine = np.where(cosine < 0, np.float32(2), sine)  # over half a sphere is never skipped
-        rows, turned = (np.stack([value[i] for value in kept.values()]) for i in (0, 1))
-        return Beams(k, rows, turned, sine, offset), np.array(which[1:], np.int64)
+        which = np.array([self._row[key] for key in keys[1:]], np.int64)
+        return Beams(k, self._rows, self._axes, sine, offset), which
 
 
 def _turned(directions: F32, axes: F32, rotation: F64) -> tuple[F32, F32]:

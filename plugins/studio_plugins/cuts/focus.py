@@ -74,6 +74,36 @@ def lobe_error(
 
 
 @kernel
+def _errors(
+    wi: F32,
+    count: int,
+    ox: np.float32,
+    oy: np.float32,
+    oz: np.float32,
+    spread: F32,
+    arrives: F32,
+    alpha: np.float32,
+    bright: F32,
+    out: F32,
+) -> None:
+    """bright (reflectance) becomes each node's contribution, out its `lobe_error`; vectorised."""
+    for node in range(count):
+        contribution = bright[node] * arrives[node]
+        bright[node] = contribution
+        out[node] = lobe_error(
+            wi[node],
+            wi[count + node],
+            wi[2 * count + node],
+            ox,
+            oy,
+            oz,
+            spread[node],
+            contribution,
+            alpha,
+        )
+
+
+@kernel
 def _split(
     place: int,
     size: int,
@@ -177,7 +207,8 @@ def focus_nodes(
     waiting = np.empty((2 * MOST_NODES, NODE), np.float32)  # this turn's and the next one's
     wi = np.empty(3 * MOST_NODES, np.float32)
     values = np.empty(weights.shape[1] * MOST_NODES, np.float32)
-    bright = np.empty(MOST_NODES, np.float32)
+    bright, errors = np.empty(MOST_NODES, np.float32), np.empty(MOST_NODES, np.float32)
+    arrives, width = np.empty(MOST_NODES, np.float32), np.empty(MOST_NODES, np.float32)
     place = 0
     for number in range(begin, stop):
         if len(out) - 6 * place < 6 * MOST_NODES:
@@ -207,31 +238,23 @@ def focus_nodes(
         for turn in range(ROUNDS):
             now, later = current * MOST_NODES, (1 - current) * MOST_NODES
             for node in range(count):
-                wi[node] = waiting[now + node, 0]
-                wi[count + node] = waiting[now + node, 1]
-                wi[2 * count + node] = waiting[now + node, 2]
+                row = now + node
+                wi[node] = waiting[row, 0]
+                wi[count + node] = waiting[row, 1]
+                wi[2 * count + node] = waiting[row, 2]
+                arrives[node] = waiting[row, 3] + waiting[row, 4] + waiting[row, 5]
+                width[node] = waiting[row, 6]
             call_address(address[m], shape, wo, count, wi, values)
             _luminous(values, count, terms[m], weights, m, bright)
-            for node in range(count):
-                row = now + node
-                bright[node] *= waiting[row, 3] + waiting[row, 4] + waiting[row, 5]
-                if turn == 0:
+            _errors(wi, count, wo[0], wo[1], wo[2], width, arrives, alpha[m], bright, errors)
+            if turn == 0:
+                for node in range(count):
                     total += bright[node]
             allowed = tolerance * total
             next_count = later
             for node in range(count):
                 row = now + node
-                error = lobe_error(
-                    waiting[row, 0],
-                    waiting[row, 1],
-                    waiting[row, 2],
-                    wo[0],
-                    wo[1],
-                    wo[2],
-                    waiting[row, 6],
-                    bright[node],
-                    alpha[m],
-                )
+                error = errors[node]
                 if error > allowed and turn + 1 < ROUNDS:
                     cell = int(waiting[row, 7])
                     level = 0

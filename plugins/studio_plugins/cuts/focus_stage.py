@@ -30,7 +30,8 @@ Bools = npt.NDArray[np.bool_]
 BROADEST = 1.5  # slope of lobes for which nodes do as they are
 SHARPER = 0.85  # a lobe narrower than this share of the one that nodes were split for needs them split again
 AHEAD = 0.7  # of the width of a lobe is split for while it changes
-MOVING = 2.5  # times as much is allowed while somebody looks around
+MOVING = 6.0  # times as much is allowed while somebody looks around or turns the light
+DRIFT = 0.25  # share of a lobe's width that the way to the eye may turn by while somebody looks around
 _ROOM = 512
 
 
@@ -59,6 +60,8 @@ class FocusStage:
         self._table = NodeTable(0)
         self._version: I64 = np.zeros(0, np.int64)
         self._alpha: F32 = np.zeros(0, np.float32)
+        self._tolerance: F32 = np.zeros(0, np.float32)
+        self._eye: F32 = np.zeros((0, 3), np.float32)
         self._positions: F32 = np.zeros((0, 3), np.float32)
         self._state: tuple[object, ...] = ()
 
@@ -71,32 +74,27 @@ class FocusStage:
             lobes = self._lobes(inputs[Shapes])
             slopes = [lobe.slope if lobe.slope < BROADEST else 0.0 for lobe in lobes]
             alpha = np.array([*slopes, 0.0], np.float32)
-            wanted = quality(frame.params.quality)
-            eye = tuple(frame.view.transform.translation)
-            tolerance = wanted.lobe
-            if frame.moving:  # what was split finely for the same eye stays
-                kept = self._state[:2] == (eye, wanted.lobe)
-                tolerance *= 1 if kept else MOVING
-            state = (eye, tolerance, seen.store, seen.store.generation, prefix)
-            count = len(mesh.positions)
-            if state != self._state or count != len(self._table):
-                self._table = self._table.resized(count)
-                self._version, self._alpha = np.full(count, -1, np.int64), np.zeros(count, np.float32)
-                self._state = state
-            elif self._positions is not mesh.positions:
-                self._version[(self._positions != mesh.positions).any(axis=1)] = -1
-            self._positions = mesh.positions
+            wanted = quality(frame.params.quality).lobe
+            eye = (np.asarray(frame.view.transform.translation, np.float64) - mesh.origin).astype(np.float32)
+            self._follow(seen, prefix, mesh.positions)
             mine = alpha[mesh.material]
+            asked = seen.summed & (mine > 0)
             stale = (self._version != base.version) | (mine < SHARPER * self._alpha)
-            stale &= seen.summed & (mine > 0)
+            if not frame.moving:
+                stale |= (self._tolerance > wanted) | (self._eye != eye).any(axis=1)
+            rows = np.flatnonzero(asked & ~stale)
+            rows = rows[(self._eye[rows] != eye).any(axis=1)]
+            stale[rows] = turned(mesh.positions[rows], self._eye[rows], eye) > DRIFT * mine[rows]
+            stale &= asked
             self._version[mine <= 0] = -1  # what gets sharp again is split again
             self._table.drop(self._version != base.version)
             if stale.any():
                 weights = self._weights(frame.scene, inputs[Surfaces].materials)
-                local_eye = (np.asarray(eye, np.float64) - mesh.origin).astype(np.float32)
+                tolerance = MOVING * wanted if frame.moving else wanted
                 ahead = np.float32(AHEAD if frame.moving else 1)  # a slider goes on the way it goes
-                self._split(base, prefix, inputs, stale, local_eye, ahead * alpha, weights, tolerance, job)
+                self._split(base, prefix, inputs, stale, eye, ahead * alpha, weights, tolerance, job)
                 self._version[stale], self._alpha[stale] = base.version[stale], ahead * mine[stale]
+                self._tolerance[stale], self._eye[stale] = tolerance, eye
         layers = []
         for node, tables in arriving.layers:
             pairs = [(table, self._table if table is base else None) for table in tables]
@@ -106,6 +104,19 @@ class FocusStage:
         if previous is not None and previous.newest == newest and previous.layers == tuple(layers):
             return previous
         return Focused(tuple(layers), newest)
+
+    def _follow(self, seen: Seen, prefix: Prefix, positions: F32) -> None:
+        """Forget what was split for other vertices, in other light or elsewhere."""
+        count = len(positions)
+        state = (seen.store, seen.store.generation, prefix)
+        if state != self._state or count != len(self._table):
+            self._table = self._table.resized(count)
+            self._version, self._alpha = np.full(count, -1, np.int64), np.zeros(count, np.float32)
+            self._tolerance, self._eye = np.zeros(count, np.float32), np.zeros((count, 3), np.float32)
+            self._state = state
+        elif self._positions is not positions:
+            self._version[(self._positions != positions).any(axis=1)] = -1
+        self._positions = positions
 
     def _split(
         self,
@@ -175,6 +186,14 @@ class FocusStage:
         self._table.drop(stale)
         self._workers.run(len(numbered), 1, one, job)
         self._table.replace([block for index in sorted(found) for block in found[index] if len(block.points)])
+
+
+def turned(positions: F32, before: F32, eye: F32) -> F32:
+    """By how much (P,), in radians, the way from positions (P, 3) to the eye differs from before (P, 3)."""
+    was, now = before - positions, eye - positions
+    was /= np.maximum(np.linalg.norm(was, axis=1, keepdims=True), np.float32(1e-12))
+    now /= np.maximum(np.linalg.norm(now, axis=1, keepdims=True), np.float32(1e-12))
+    return np.asarray(np.linalg.norm(now - was, axis=1), np.float32)
 
 
 class LobeWeights:

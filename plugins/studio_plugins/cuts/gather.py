@@ -23,7 +23,8 @@ from studio_plugins.cuts.choose import (
     choose_nodes,
     index_runs,
 )
-from studio_plugins.cuts.intervals import ONES, U64, Pool, clear, hide, runs_of, set_bits
+from studio_plugins.cuts.glimpse import BEFORE, NOW
+from studio_plugins.cuts.intervals import ONES, U64, Pool, hide, runs_of, set_bits
 
 F32 = npt.NDArray[np.float32]
 F64 = npt.NDArray[np.float64]
@@ -81,7 +82,8 @@ def gather_light(
     total = np.empty(SUMS, np.float32)
     axes = np.empty((3, 3))
     made = np.empty((MOST_NODES, NODE), np.float32)
-    everything = np.zeros(skip.shape[2], np.bool_)
+    past = np.zeros(2, np.bool_)
+    past[BEFORE] = True
     place = kept = 0
     for number in range(begin, stop):
         if len(out) - 6 * place < 6 * MOST_NODES or len(out_runs) - kept < leaves + 2:
@@ -95,8 +97,8 @@ def gather_light(
         else:
             words[:] = ONES if length[p] + coarse_length[p] > 0 else np.uint64(0)
             hide(pool, start[p], length[p], skip[row[p], object_of[p]], words)
-            hide(coarse_pool, coarse_start[p], coarse_length[p], everything, words)
-            count = runs_of(words, len(words), 0, runs, 0) // 2
+            hide(coarse_pool, coarse_start[p], coarse_length[p], past, words)
+            count = runs_of(words, len(words), runs, 0) // 2
             run_count[number] = count
             for i in range(2 * count):
                 out_runs[kept + i] = runs[i]
@@ -150,42 +152,17 @@ def gather_light(
 
 
 @kernel
-def _mark(pool: Pool, start: int, length: int, chosen: Bools, words: U64, reach: I64) -> None:
-    """Sets what the chosen slots of a record block; reach becomes the first and last word touched."""
+def _mark(pool: Pool, start: int, length: int, chosen: int, words: U64, reach: I64) -> None:
+    """Sets what one slot of a record blocks; reach is widened to the first and last word touched."""
     place, end = start, start + length
     while place < end:
         slot, count = int(pool[place]), int(pool[place + 1])
         place += 2
-        if count > 0 and chosen[slot]:
+        if count > 0 and slot == chosen:
             reach[0] = min(reach[0], int(pool[place]) >> 6)
             reach[1] = max(reach[1], int(pool[place + 2 * count - 1]) >> 6)
             for pair in range(place, place + 2 * count, 2):
                 set_bits(words, int(pool[pair]), int(pool[pair + 1]))
-        place += 2 * count
-
-
-@kernel
-def _hide_within(
-    pool: Pool, start: int, length: int, skip: Bools, first: int, last: int, a: U64, b: U64
-) -> None:
-    """Clears in both sets what the slots that are not skipped block between leaves first and last."""
-    place, end = start, start + length
-    while place < end:
-        slot, count = int(pool[place]), int(pool[place + 1])
-        place += 2
-        if not skip[slot]:
-            low, high = 0, count  # the first interval that ends at or after `first`
-            while low < high:
-                middle = (low + high) // 2
-                if int(pool[place + 2 * middle + 1]) < first:
-                    low = middle + 1
-                else:
-                    high = middle
-            for pair in range(place + 2 * low, place + 2 * count, 2):
-                if int(pool[pair]) > last:
-                    break
-                clear(a, int(pool[pair]), int(pool[pair + 1]))
-                clear(b, int(pool[pair]), int(pool[pair + 1]))
         place += 2 * count
 
 
@@ -195,16 +172,10 @@ def gather_difference(
     stop: int,
     points: I64,
     normals: F32,
-    object_of: I32,
     glossy: Bools,
-    pool: Pool,
-    start: I64,
-    length: I32,
     coarse_pool: Pool,
     coarse_start: I64,
     coarse_length: I32,
-    row: I32,
-    skip: Bools,
     block: F64,
     leaf: F32,
     tolerance: float,
@@ -216,18 +187,15 @@ def gather_difference(
 ) -> int:
     """What the coarse records change: irradiance (V, 3) and nodes to add to those of the exact ones.
 
-    Of what the slots skip[row[p]] blocked before and what the coarse record blocks now only the leaves
-    count that nothing else hides. `known` (V, 3) is the irradiance of the exact records; otherwise as
-    `gather_light`.
+    `known` (V, 3) is the irradiance of the exact records; otherwise as `gather_light`.
     """
     leaves = len(leaf) - 1
     old, new = np.zeros(leaves >> 6, np.uint64), np.zeros(leaves >> 6, np.uint64)
-    runs = np.empty(leaves + 2, pool.dtype)
+    runs = np.empty(leaves + 2, coarse_pool.dtype)
     before = np.empty((leaves // 2 + 2, SUMS), np.float32)
     index = np.empty(leaves // BLOCK + 1, np.int64)
     axes = np.empty((3, 3))
     made = np.empty((MOST_NODES, NODE), np.float32)
-    everything = np.ones(skip.shape[2], np.bool_)
     reach = np.empty(2, np.int64)
     place = 0
     for number in range(begin, stop):
@@ -235,10 +203,9 @@ def gather_difference(
             return number - begin
         p = points[number]
         nx, ny, nz = normals[p, 0], normals[p, 1], normals[p, 2]
-        stale = skip[row[p], object_of[p]]
         reach[0], reach[1] = len(old), -1
-        _mark(pool, start[p], length[p], stale & ~skip[0, object_of[p]], old, reach)
-        _mark(coarse_pool, coarse_start[p], coarse_length[p], everything, new, reach)
+        _mark(coarse_pool, coarse_start[p], coarse_length[p], BEFORE, old, reach)
+        _mark(coarse_pool, coarse_start[p], coarse_length[p], NOW, new, reach)
         found = 0
         irradiance[p, 0], irradiance[p, 1], irradiance[p, 2] = 0.0, 0.0, 0.0
         if reach[1] >= reach[0]:
@@ -246,7 +213,6 @@ def gather_difference(
                 both = old[w] & new[w]
                 old[w] &= ~both
                 new[w] &= ~both
-            _hide_within(pool, start[p], length[p], stale, 64 * reach[0], 64 * reach[1] + 63, old, new)
             light = _RED * known[p, 0] + _GREEN * known[p, 1] + _BLUE * known[p, 2]
             allowed = np.float32(tolerance * max(light, floor))
             frame(nx, ny, nz, axes)
@@ -296,7 +262,7 @@ def gather_difference(
 @kernel
 def _runs_within(words: U64, first: int, last: int, runs: Pool) -> int:
     """How many runs of set bits there are in words first … last; they are written as pairs of leaves."""
-    length = runs_of(words[first : last + 1], last + 1 - first, 0, runs, 0)
+    length = runs_of(words[first : last + 1], last + 1 - first, runs, 0)
     for i in range(length):
         runs[i] += 64 * first
     return length // 2

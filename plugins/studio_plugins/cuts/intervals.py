@@ -51,13 +51,9 @@ def clear(words: U64, first: int, last: int) -> None:
 
 
 @kernel
-def runs_of(words: U64, count: int, shift: int, out: Pool, place: int) -> int:
-    """Writes the runs of set bits of the first `count` words as pairs from `place`; the place after.
-
-    A bit stands for 2^shift leaves.
-    """
+def runs_of(words: U64, count: int, out: Pool, place: int) -> int:
+    """Writes the runs of set bits of the first `count` words as pairs from `place`; the place after."""
     start = -1
-    fill = (1 << shift) - 1
     for w in range(count):
         word = words[w]
         if start < 0 and word == np.uint64(0):
@@ -77,13 +73,13 @@ def runs_of(words: U64, count: int, shift: int, out: Pool, place: int) -> int:
                 if rest == np.uint64(0):
                     break
                 at += lowest_bit(rest)
-                out[place] = start << shift
-                out[place + 1] = ((64 * w + at - 1) << shift) | fill
+                out[place] = start
+                out[place + 1] = 64 * w + at - 1
                 place += 2
                 start = -1
     if start >= 0:
-        out[place] = start << shift
-        out[place + 1] = ((64 * count - 1) << shift) | fill
+        out[place] = start
+        out[place + 1] = 64 * count - 1
         place += 2
     return place
 

@@ -21,7 +21,7 @@ I64 = npt.NDArray[np.int64]
 Bools = npt.NDArray[np.bool_]
 
 CHUNK = 128
-MOVING = 2.5  # times as much is allowed of a node while a hand turns the light
+MOVING = 8.0  # times as much is allowed of a node while a hand turns the light, or of what coarse records see
 _FLOOR = 0.02  # of the irradiance of an open place: darker ones need no finer nodes
 _ROOM, _RUNS = 384, 1024  # nodes and run ends a point that room is made for at first
 
@@ -129,25 +129,13 @@ class LightCache:
         prefix = self._prefix
         assert prefix is not None
         table = self.table if whole else self.difference
+        passing = bool((sources.row[points] > 0).all())
         counts, run_counts = np.zeros(len(points), np.int64), np.zeros(len(points), np.int64)
         found: dict[int, NodeBlock] = {}
-        given = (
-            mesh.normals,
-            sources.owner,
-            glossy,
-            sources.pool,
-            sources.start,
-            sources.length,
-            sources.coarse_pool,
-            sources.coarse_start,
-            sources.coarse_length,
-            sources.row,
-            sources.skip,
-            prefix.block,
-            prefix.leaf,
-            self._tolerance,
-            _FLOOR * prefix.power / 4,
-        )
+        exact = sources.pool, sources.start, sources.length
+        coarse = sources.coarse_pool, sources.coarse_start, sources.coarse_length
+        tolerance = MOVING * self._tolerance if passing else self._tolerance
+        floor = _FLOOR * prefix.power / 4
 
         def body(begin: int, stop: int) -> None:
             while begin < stop:
@@ -160,7 +148,17 @@ class LightCache:
                         begin,
                         stop,
                         points,
-                        *given,
+                        mesh.normals,
+                        sources.owner,
+                        glossy,
+                        *exact,
+                        *coarse,
+                        sources.row,
+                        sources.skip,
+                        prefix.block,
+                        prefix.leaf,
+                        tolerance,
+                        floor,
                         table.irradiance,
                         out,
                         counts,
@@ -173,7 +171,20 @@ class LightCache:
                     )
                 else:
                     done = gather_difference(
-                        begin, stop, points, *given, self.table.irradiance, table.irradiance, out, counts
+                        begin,
+                        stop,
+                        points,
+                        mesh.normals,
+                        glossy,
+                        *coarse,
+                        prefix.block,
+                        prefix.leaf,
+                        tolerance,
+                        floor,
+                        self.table.irradiance,
+                        table.irradiance,
+                        out,
+                        counts,
                     )
                 first = starts(counts[begin : begin + done])
                 data = out[: FLOATS * int(first[-1])].copy()

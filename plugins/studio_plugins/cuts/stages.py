@@ -36,6 +36,7 @@ from studio_core.shading.primary import visible_vertices
 from studio_plugins.cuts import keeping
 from studio_plugins.cuts.choose import Prefix
 from studio_plugins.cuts.forecast import Forecast
+from studio_plugins.cuts.glimpse import Glow
 from studio_plugins.cuts.lamps import LampCache, Source, lamp_source, sphere
 from studio_plugins.cuts.light_cache import LightCache
 from studio_plugins.cuts.lobes import LobeTable
@@ -53,9 +54,11 @@ I64 = npt.NDArray[np.int64]
 Bools = npt.NDArray[np.bool_]
 
 EXACT, PAPER = "exact", "svc-vcf"
-FIRST_LEVELS = (10, 12)
+FIRST_LEVELS = (5, 7)
 """Fineness of the first pictures of a scene of which nothing is known."""
-COARSEST, FINEST = 11, 13
+COARSEST, FINEST, STEP = 6.5, 9.0, 0.5
+EVEN = 6.5
+"""A preview of fineness n errs about as 2^(n + EVEN) directions do that are spread evenly."""
 SLOW, QUICK = 0.1, 0.035
 """Fineness of previews, and seconds of one after which the next is coarser, or finer."""
 LONG = 0.6
@@ -88,7 +91,7 @@ class Seen:
 class VisibilityStage:
     """Traces what is not known, coarsely while somebody moves something."""
 
-    needs: tuple[type, ...] = (Surfaces, Casters, Hits)
+    needs: tuple[type, ...] = (Surfaces, Casters, Hits, Lighting)
     gives = Seen
     dirtied_by = Aspect.VIEW | Aspect.QUALITY
 
@@ -96,10 +99,11 @@ class VisibilityStage:
         self._workers = services.workers
         self._cache: DiskCache | None = services.cache
         self._store: VisibilityStore | None = None
-        self._preview = FINEST - 1
+        self._preview = COARSEST + STEP
         self._forecast = Forecast()
         self._occluders = OccluderTable()
         self._asked: tuple[Surfaces, Occluders] | None = None
+        self._glow: tuple[LightTree, Glow] | None = None
 
     def run(self, frame: Frame, inputs: Inputs, job: Job) -> Seen:
         """The previous where nobody sees anything else; publishes coarse steps of what is new."""
@@ -127,15 +131,16 @@ class VisibilityStage:
                 between, core = parents(surfaces.mesh), mask.copy()
                 descend(between, core)
                 points = np.flatnonzero(core)
-            self._look(points, job)
+            self._look(points, self._glowing(inputs[Lighting], k), job)
         else:
+            glow = self._glowing(inputs[Lighting], k)
             for level in self._steps(points, job):
-                store.preview(points, level, job)
-                job.publish(Seen(store, points, mask, False, level))
+                store.preview(points, level, job, glow)
+                job.publish(Seen(store, points, mask, False, int(level + EVEN)))
             self._trace(points, job)
         exact = not len(store.unknown(points))
         exact = exact and between is None
-        made = Seen(store, points, mask, exact, k if exact else self._preview, between)
+        made = Seen(store, points, mask, exact, k if exact else min(int(self._preview + EVEN), k), between)
         return self._unless_same(inputs.previous, made, generation, before)
 
     def _unless_same(self, previous: Seen | None, made: Seen, generation: int, before: int) -> Seen:
@@ -168,7 +173,7 @@ class VisibilityStage:
         kept = keeping.save(self._cache, store, surfaces, occluders) if self._cache is not None else 0
         return {"vertices_traced": missing, "bytes": kept}
 
-    def _steps(self, points: I64, job: Job) -> tuple[int, ...]:
+    def _steps(self, points: I64, job: Job) -> tuple[float, ...]:
         """Finenesses to show first, where somebody waits for it and exact tracing would take long."""
         store = self._store
         assert store is not None
@@ -177,10 +182,10 @@ class VisibilityStage:
             return ()
         new = store.never(unknown)
         if store.unseen(unknown):
-            levels: tuple[int, ...] = FIRST_LEVELS
+            levels: tuple[float, ...] = FIRST_LEVELS
         else:
             levels = (self._preview,) if self._forecast(new, len(unknown) - new) > LONG else ()
-        return tuple(level for level in levels if level < store.k)
+        return tuple(level for level in levels if level + EVEN < store.k)
 
     def _trace(self, points: I64, job: Job) -> None:
         store = self._store
@@ -190,15 +195,23 @@ class VisibilityStage:
         store.trace(points, job)
         self._forecast.learn(new, len(unknown) - new, time.perf_counter() - started)
 
-    def _look(self, points: I64, job: Job) -> None:
+    def _glowing(self, lighting: Lighting, k: int) -> Glow | None:
+        tree = lighting.tree
+        if tree is None:
+            return None
+        if self._glow is None or self._glow[0] is not tree or self._glow[1].k != k:
+            self._glow = tree, Glow.of(tree, k)
+        return self._glow[1]
+
+    def _look(self, points: I64, glow: Glow | None, job: Job) -> None:
         assert self._store is not None
         started = time.perf_counter()
-        self._store.preview(points, self._preview, job)
+        self._store.preview(points, self._preview, job, glow)
         taken = time.perf_counter() - started
         if taken > SLOW:
-            self._preview = max(self._preview - 1, COARSEST)
+            self._preview = max(self._preview - STEP, COARSEST)
         elif taken < QUICK:
-            self._preview = min(self._preview + 1, FINEST)
+            self._preview = min(self._preview + STEP, FINEST)
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,7 +6,7 @@ tell by stamps which vertices have another record than before.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -20,6 +20,7 @@ from studio_core.shading.artifacts import Surfaces
 from studio_core.shading.interpolation import parents
 from studio_core.shading.job import Job
 from studio_plugins.cuts.beams import BeamTable, parts_of
+from studio_plugins.cuts.glimpse import Glow, glimpse_records
 from studio_plugins.cuts.guides import packets_around
 from studio_plugins.cuts.intervals import gather_records, relabel
 from studio_plugins.cuts.occluders import Occluders
@@ -45,7 +46,7 @@ Points = I64
 CHUNK = {True: 32, False: 160}  # of whole records, and of coarse ones
 BATCH = 4096
 MOST_SLOTS = 60_000
-_NUMBERS_A_RECORD = {True: 4096, False: 256}  # room that is made at first
+_NUMBERS_A_RECORD = {True: 4096, False: 512}  # room that is made at first
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,7 +86,7 @@ class VisibilityStore:
         self.stamp = 0
         self.exact = Records(k, 0)
         self._coarse = Records(k, 0)
-        self._coarse_level = 0
+        self._coarse_level = 0.0
         self._coarse_row: I32 = np.zeros(0, np.int32)
         self._coarse_stale: list[Bools] = []
         self._workers = workers
@@ -166,7 +167,7 @@ class VisibilityStore:
 
     def _forget_coarse(self) -> None:
         self._coarse.forget()
-        self._coarse_level = 0
+        self._coarse_level = 0.0
         self._coarse_row = np.zeros(len(self._coarse), np.int32)
         self._coarse_stale = []
 
@@ -288,15 +289,14 @@ class VisibilityStore:
             job.checkpoint(first, len(todo))
             block = todo[first : first + BATCH]
             row, table = self._stale(block)
-            pieces, length, changed = self._run(block, row, table, self.k, True, job)
+            pieces, length, changed = self._run(block, row, table, job)
             self.stamp += 1
             self.exact.write(block[changed], pieces, length[changed], self.stamp)
             self.exact.epoch[block] = self._now
         self.exact.tidy()
 
-    def preview(self, points: Points, level: int, job: Job) -> None:
-        """Coarse records, one ray for 2^(k − level) leaves, of what is out of date for the points."""
-        level = min(level, self.k)
+    def preview(self, points: Points, level: float, job: Job, glow: Glow | None = None) -> None:
+        """Coarse records of what is out of date for the points: rays for 2^-level of a vertex' light each."""
         if level > self._coarse_level:
             self._forget_coarse()
         todo = self.unknown(points)
@@ -305,7 +305,9 @@ class VisibilityStore:
             return
         self._coarse_level = level
         row, table = self._stale(todo)
-        pieces, length, changed = self._run(todo, row, table, level, False, job)
+        if glow is None or glow.k != self.k:
+            glow = Glow.even(self.k)
+        pieces, length, changed = self._run(todo, row, table, job, (glow, 0.5**level))
         touched, rest = todo[changed], todo[~changed]
         self.stamp += 1
         self._coarse.write(touched, pieces, length[changed], self.stamp)
@@ -325,71 +327,50 @@ class VisibilityStore:
         return made
 
     def _run(
-        self, points: Points, row: I64, table: Bools, level: int, whole: bool, job: Job
+        self, points: Points, row: I64, table: Bools, job: Job, glimpse: tuple[Glow, float] | None = None
     ) -> tuple[list[npt.NDArray[Any]], I32, Bools]:
         """Records (those that changed, one after the other), their lengths, and which changed."""
         surfaces, occluders = self._surfaces, self._occluders
         assert surfaces is not None
         assert occluders is not None
-        mesh = surfaces.mesh
+        mesh, exact = surfaces.mesh, self.exact
         parts = parts_of(occluders.caster, mesh.origin)
-        beams, which = self._beams(level, parts.turn)
-        exact, guides = self.exact, self._guides(points)
+        beams, which = self._beams(self.k, parts.turn)
         length, changed = np.zeros(len(points), np.int32), np.zeros(len(points), np.bool_)
+        kernel: Callable[..., int] = trace_records if glimpse is None else glimpse_records
+        if glimpse is None:
+            names = self._slots
+            rest: tuple[Any, ...] = self._guides(points), packets_around(self.k), len(self._alive)
+        else:
+            names = np.full(len(self._alive), -1, np.int64)
+            names[self._slots] = np.arange(len(self._slots))
+            rest = glimpse[0].power, glimpse[0].peak, glimpse[1]
+        asked: tuple[Any, ...] = (
+            *(points, row, table),
+            *(mesh.positions, mesh.normals, mesh.geometric, mesh.inset, self._owner, names),
+            *(exact.pool, exact.start, exact.length),
+            *(parts.occluded8, parts.scene, parts.from_mesh, parts.turn, parts.half, parts.radius),
+            *(parts.epsilon, which, beams.rows, beams.axis, beams.sine, beams.offset),
+            *rest,
+        )
         found: dict[int, list[npt.NDArray[Any]]] = {}
         counts: dict[int, I64] = {}
-        room = (2 << self.k) + 64
+        room = (4 << self.k) + 64
+        each = _NUMBERS_A_RECORD[glimpse is None]
 
         def body(begin: int, stop: int) -> None:
             mine, tally = [], np.zeros(COUNTS, np.int64)
-            start, size = begin, room + _NUMBERS_A_RECORD[whole] * (stop - begin)
+            start, size = begin, room + each * (stop - begin)
             while start < stop:
                 out = np.empty(size, exact.pool.dtype)
                 used = np.zeros(1, np.int64)
-                done = trace_records(
-                    start,
-                    stop,
-                    points,
-                    row,
-                    table,
-                    mesh.positions,
-                    mesh.normals,
-                    mesh.geometric,
-                    mesh.inset,
-                    self._owner,
-                    self._slots,
-                    exact.pool,
-                    exact.start,
-                    exact.length,
-                    parts.occluded8,
-                    parts.scene,
-                    parts.from_mesh,
-                    parts.turn,
-                    parts.half,
-                    parts.radius,
-                    parts.epsilon,
-                    which,
-                    beams.rows,
-                    beams.axis,
-                    beams.sine,
-                    beams.offset,
-                    self.k - level,
-                    guides,
-                    packets_around(self.k),
-                    len(self._alive),
-                    whole,
-                    out,
-                    length,
-                    changed,
-                    used,
-                    tally,
-                )
+                done = kernel(start, stop, *asked, out, length, changed, used, tally)
                 mine.append(out[: int(used[0])].copy())
                 start += done
                 size = size if done else 2 * size
             found[begin], counts[begin] = mine, tally
 
-        self._workers.run(len(points), CHUNK[whole], body, job)
+        self._workers.run(len(points), CHUNK[glimpse is None], body, job)
         self.counts += sum(counts.values(), np.zeros(COUNTS, np.int64))
         occluders.caster.count(int(sum(tally[RAYS] for tally in counts.values())))
         return [piece for begin in sorted(found) for piece in found[begin]], length, changed

@@ -221,7 +221,7 @@ def _checked(
 
 
 @kernel
-def _below(normal: F32, rows: F32, axis: F32, sine: F32, offset: I64, words: U64) -> None:
+def below(normal: F32, rows: F32, axis: F32, sine: F32, offset: I64, words: U64) -> None:
     """Sets the bits of the leaves whose direction is not above a vertex' horizon."""
     nx, ny, nz = normal[0], normal[1], normal[2]
     for group in range(len(words)):
@@ -277,11 +277,9 @@ def trace_records(
     axis: F32,
     sine: F32,
     offset: I64,
-    shift: int,
     guides: I64,
     around: I32,
     slot_count: int,
-    whole: bool,
     out: Pool,
     out_length: I32,
     changed: Bools,
@@ -293,8 +291,7 @@ def trace_records(
     Returns how many points fitted; used[0] is how many numbers they took.
 
     stale[stale_row[p], r, j] says that what object r's vertices know of object j must be traced again; the
-    rest is copied from the old record pool[start:start + length] when the record is to be `whole`, or left
-    out. One ray stands for 2^shift leaves.
+    rest is copied from the old record pool[start:start + length].
     guides (P, 2) are vertices with records of what is now between which a point lies, or -1: where they agree
     (see `guess`) a point without a record takes it from them.
     `changed` marks points whose record differs (without one, all); `counts` (COUNTS,) is added to.
@@ -312,7 +309,7 @@ def trace_records(
     scratch, sure = np.empty(groups, np.uint64), np.empty(groups, np.uint64)
     skipped = np.empty(groups, np.uint64)
     planes = np.empty((6, 3))
-    room = (8 * packets << shift) + 4
+    room = 8 * packets + 4
     place = 0
     for number in range(begin, stop):
         p = points[number]
@@ -323,7 +320,7 @@ def trace_records(
         while at < end:
             where[pool[at]] = at
             at += 2 + 2 * int(pool[at + 1])
-        guided = guides[number, 0] >= 0 and length[p] == 0 and shift == 0
+        guided = guides[number, 0] >= 0 and length[p] == 0
         if guided:
             index_record(pool, start[guides[number, 0]], length[guides[number, 0]], where_a)
             index_record(pool, start[guides[number, 1]], length[guides[number, 1]], where_b)
@@ -346,22 +343,19 @@ def trace_records(
                 full = True
                 break
             if not stale[stale_row[number], r, j]:
-                if known >= 0 and whole:
+                if known >= 0:
                     out[place : place + known_length] = pool[known : known + known_length]
                     place += known_length
                 if j == r:
                     hidden[:] = np.uint64(0)
                     if known >= 0:
                         for pair in range(known + 2, known + known_length, 2):
-                            low = (int(pool[pair]) + (1 << shift) - 1) >> shift
-                            high = ((int(pool[pair + 1]) + 1) >> shift) - 1
-                            if high >= low:
-                                set_bits(hidden, low, high)
+                            set_bits(hidden, int(pool[pair]), int(pool[pair + 1]))
                 continue
             counts[TRACED] += 1
             if j == r:
                 if good:
-                    _below(normals[p], rows[0], axis[0], sine, offset, hidden)
+                    below(normals[p], rows[0], axis[0], sine, offset, hidden)
                 else:
                     hidden[:] = ONES
             found = 0
@@ -412,7 +406,7 @@ def trace_records(
                         hidden[g] |= words[g]
                 found = 1
             if found > 0:
-                after = runs_of(hidden if j == r else words, groups, shift, out, place + 2)
+                after = runs_of(hidden if j == r else words, groups, out, place + 2)
                 out[place] = slot
                 out[place + 1] = (after - place - 2) // 2
                 if after - place != known_length or not _same(out, place, pool, known, known_length):

@@ -21,6 +21,7 @@ from studio_core.scene.transform import Transform, axis_angle
 from studio_core.scene.world_mesh import MeshCache, world_mesh
 from studio_core.shading.artifacts import Casters, Surfaces
 from studio_core.shading.job import Job
+from studio_plugins.cuts.glimpse import BEFORE
 from studio_plugins.cuts.occluders import Occluders, alone
 
 CACHE = MeshCache()
@@ -135,7 +136,7 @@ def seen_by(store: Any) -> npt.NDArray[np.bool_]:
         coarse = sources.coarse_pool[first : first + sources.coarse_length[p]]
         if len(exact) + len(coarse):
             skip = np.flatnonzero(sources.skip[sources.row[p], r])
-            made[p] = oracle.seen(exact, size, skip) & oracle.seen(coarse, size)
+            made[p] = oracle.seen(exact, size, skip) & oracle.seen(coarse, size, [BEFORE])
     return made
 
 

@@ -604,15 +604,15 @@ def test_coarse_pictures_of_a_new_scene_come_first(host, services):
     published: list[Radiance] = []
     scene = lit_scene()
     backend = host.get("backend", "cuts")
-    params = params_of(host, **{**FAST, "directions": "8192"})
+    params = params_of(host, **{**FAST, "directions": "16384"})
     pipeline = Pipeline(backend.stages(services))
     job = Job("listened to", on_publish=published.append)
     view = scene_view(scene, None, 48, 36)
     final = pipeline.update(Frame(scene, view, params, 1), Changes(), job)
-    assert [made.directions for made in published] == [1 << 10, 1 << 12, 1 << 13]
+    assert [made.directions for made in published] == [1 << 11, 1 << 13, 1 << 14]
     assert [made.final for made in published] == [False, False, True]
     assert final.final
-    assert final.directions == 8192
+    assert final.directions == 16384
     for made in published:
         wrong = made.layers["sky"].irradiance - final.layers["sky"].irradiance
         mean = final.layers["sky"].irradiance[final.valid].mean()

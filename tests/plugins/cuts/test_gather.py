@@ -15,6 +15,7 @@ from studio_core.kernels.light_tree import LightTree
 from studio_core.kernels.radiance import frame
 from studio_plugins.cuts.choose import MOST_NODES, Prefix
 from studio_plugins.cuts.gather import gather_difference, gather_light
+from studio_plugins.cuts.glimpse import BEFORE, NOW
 
 K = 10
 S = 1 << K
@@ -79,20 +80,14 @@ def gathered(points, leaves, tolerance=0.0, known=None, kind=np.uint16, room=MOS
         if point.coarse is not None:
             row[number] = number + 1
             skip[number + 1, 0, list(point.stale)] = True
-    given_ = (
-        np.arange(count, dtype=np.int64),
-        np.array([point.normal for point in points], np.float32),
-        np.zeros(count, np.int32),
-        np.array([point.glossy for point in points], np.bool_),
-        *pooled([point.exact for point in points]),
-        *pooled([point.coarse or {} for point in points]),
-        row,
-        skip,
-        prefix.block,
-        prefix.leaf,
-        tolerance,
-        0.02 * prefix.power / 4,
-    )
+    numbers = np.arange(count, dtype=np.int64)
+    normals = np.array([point.normal for point in points], np.float32)
+    glossy = np.array([point.glossy for point in points], np.bool_)
+    exact, coarse = pooled([point.exact for point in points]), pooled([glimpsed(point) for point in points])
+    light_ = prefix.block, prefix.leaf, tolerance, 0.02 * prefix.power / 4
+    owner = np.zeros(count, np.int32)
+    given_ = numbers, normals, owner, glossy, *exact, *coarse, row, skip, *light_
+    differing = numbers, normals, glossy, *coarse, *light_
     irradiance, nodes = np.zeros((count, 3), np.float32), np.zeros(count, np.int64)
     runs_of = runs_of or [None] * count
     kept_runs = [[] if own is None else np.ravel(own).tolist() for own in runs_of]
@@ -111,7 +106,7 @@ def gathered(points, leaves, tolerance=0.0, known=None, kind=np.uint16, room=MOS
                 kept_pool, kept_start, kept_length, runs, run_count,
             )  # fmt: skip
         else:
-            stop = begin + gather_difference(begin, count, *given_, known, irradiance, out, nodes)
+            stop = begin + gather_difference(begin, count, *differing, known, irradiance, out, nodes)
         assert stop > begin
         place = ran = 0
         for number in range(begin, stop):
@@ -129,6 +124,21 @@ def gathered(points, leaves, tolerance=0.0, known=None, kind=np.uint16, room=MOS
             place += n
         begin = stop
     return made
+
+
+def glimpsed(point):
+    """The record of a glimpse: what its coarse slots hide, and what the stale ones did, without the rest."""
+    if point.coarse is None:
+        return {}
+    rest, before, now = np.zeros(S, bool), np.zeros(S, bool), np.zeros(S, bool)
+    for slot, blocked in point.exact.items():
+        if slot in point.stale:
+            before |= blocked
+        elif slot != DEAD:
+            rest |= blocked
+    for blocked in point.coarse.values():
+        now |= blocked
+    return {NOW: now & ~rest, BEFORE: before & ~rest}
 
 
 def duff(normal):

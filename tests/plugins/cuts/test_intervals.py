@@ -44,13 +44,13 @@ def test_the_lowest_bit_is_found(place, above):
     assert lowest_bit(np.uint64(((above << 1 | 1) << place) & ((1 << 64) - 1))) == place
 
 
-@given(spans, st.sampled_from(TYPES), st.integers(0, 3))
-def test_runs_of_words(pairs, kind, shift):
+@given(spans, st.sampled_from(TYPES))
+def test_runs_of_words(pairs, kind):
     bits = leaves(pairs)
     out = np.full(2 * len(bits) + 3, 7, kind)
-    after = runs_of(oracle.words_of(bits), WORDS, shift, out, 3)
+    after = runs_of(oracle.words_of(bits), WORDS, out, 3)
     found = list(zip(out[3:after:2].tolist(), out[4:after:2].tolist(), strict=True))
-    assert found == oracle.runs(np.repeat(bits, 1 << shift))
+    assert found == oracle.runs(bits)
     assert (out[:3] == 7).all()
     assert (out[after:] == 7).all()
 
@@ -58,7 +58,7 @@ def test_runs_of_words(pairs, kind, shift):
 @given(st.lists(st.booleans(), min_size=64, max_size=64))
 def test_runs_of_any_word(bits):
     out = np.zeros(64, np.uint16)
-    after = runs_of(oracle.words_of(np.array(bits)), 1, 0, out, 0)
+    after = runs_of(oracle.words_of(np.array(bits)), 1, out, 0)
     assert list(zip(out[:after:2].tolist(), out[1:after:2].tolist(), strict=True)) == oracle.runs(bits)
 
 
@@ -93,7 +93,7 @@ def test_leaves_beyond_what_a_small_record_holds(kind):
     words = np.zeros((top + 1) // 64, np.uint64)
     set_bits(words, top - 1, top)
     out = np.zeros(4, kind)
-    assert runs_of(words, len(words), 0, out, 0) == 2
+    assert runs_of(words, len(words), out, 0) == 2
     assert out[:2].tolist() == [top - 1, top]
 
 

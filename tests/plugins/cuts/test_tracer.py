@@ -102,16 +102,6 @@ def test_what_does_not_stop_light_stops_none(kit, workers, job):
     assert kit.seen_by(without)[floor_points].sum() < kit.seen_by(with_box)[floor_points].sum()
 
 
-@pytest.mark.parametrize("level", [10, 11])
-def test_coarse_records_are_those_of_coarser_directions(kit, workers, job, level):
-    room = kit.room
-    store = VisibilityStore(13, workers)
-    store.follow(room.surfaces, room.occluders)
-    store.preview(room.everything, level, job)
-    coarse = kit.seen_by(traced(room, workers, job, level))
-    np.testing.assert_array_equal(kit.seen_by(store), np.repeat(coarse, 1 << (13 - level), axis=1))
-
-
 def test_more_directions_than_a_small_record_holds(kit, workers, job):
     room = kit.make({n: kit.room.things[n] for n in ("floor", "box")}, edge=4.0)
     store = traced(room, workers, job, 17)
