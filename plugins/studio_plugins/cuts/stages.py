@@ -18,7 +18,7 @@ from studio_core.contract import Services
 from studio_core.kernels.light_tree import LightTree
 from studio_core.kernels.refinement import descend
 from studio_core.scene.diff import Aspect
-from studio_core.scene.nodes import NodeId
+from studio_core.scene.nodes import NodeId, Scene
 from studio_core.scene.transform import Transform
 from studio_core.shading.artifacts import (
     Casters,
@@ -59,7 +59,7 @@ FIRST_LEVELS = (5, 7)
 COARSEST, FINEST, STEP = 6.5, 9.0, 0.5
 EVEN = 6.5
 """A preview of fineness n errs about as 2^(n + EVEN) directions do that are spread evenly."""
-SLOW, QUICK = 0.1, 0.035
+SLOW, QUICK = 0.065, 0.03
 """Fineness of previews, and seconds of one after which the next is coarser, or finer."""
 LONG = 0.6
 """Seconds of exact tracing that somebody who has let go of something is not left waiting for."""
@@ -102,7 +102,9 @@ class VisibilityStage:
         self._preview = COARSEST + STEP
         self._forecast = Forecast()
         self._occluders = OccluderTable()
+        self._casters: Casters | None = None
         self._asked: tuple[Surfaces, Occluders] | None = None
+        self._mask: tuple[Surfaces, Hits, bool, Bools] | None = None
         self._glow: tuple[LightTree, Glow] | None = None
 
     def run(self, frame: Frame, inputs: Inputs, job: Job) -> Seen:
@@ -115,10 +117,7 @@ class VisibilityStage:
         generation, before = store.generation, store.stamp
         occluders = self._occluders(frame.scene, surfaces, inputs[Casters])
         store.follow(surfaces, occluders)
-        if frame.params.everywhere:
-            mask = np.ones(len(surfaces.mesh.positions), np.bool_)
-        else:
-            mask = visible_vertices(surfaces, hits)
+        mask = self._wanted(surfaces, hits, frame.params.everywhere)
         points = np.flatnonzero(mask)
         self._asked = surfaces, occluders
         if frame.params.method != EXACT:
@@ -194,6 +193,22 @@ class VisibilityStage:
         new, started = store.never(unknown), time.perf_counter()
         store.trace(points, job)
         self._forecast.learn(new, len(unknown) - new, time.perf_counter() - started)
+
+    def _blocking(self, scene: Scene, surfaces: Surfaces, casters: Casters) -> Occluders:
+        """The occluders, asked anew only where something stands elsewhere or is another."""
+        if self._asked is None or self._asked[0] is not surfaces or self._casters is not casters:
+            self._casters = casters
+            return self._occluders(scene, surfaces, casters)
+        return self._asked[1]
+
+    def _wanted(self, surfaces: Surfaces, hits: Hits, everywhere: bool) -> Bools:
+        """(V,) the vertices to be lit."""
+        known = self._mask
+        if known is None or known[0] is not surfaces or known[1] is not hits or known[2] != everywhere:
+            count = len(surfaces.mesh.positions)
+            mask = np.ones(count, np.bool_) if everywhere else visible_vertices(surfaces, hits)
+            known = self._mask = surfaces, hits, everywhere, mask
+        return known[3]
 
     def _glowing(self, lighting: Lighting, k: int) -> Glow | None:
         tree = lighting.tree
