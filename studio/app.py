@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import faulthandler
+import subprocess
 import sys
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -13,7 +14,7 @@ from typing import Any, TextIO
 from PySide6.QtCore import QCoreApplication, QEvent, Qt
 from PySide6.QtWidgets import QApplication
 
-from studio import samples
+from studio import compile_ahead, samples
 from studio_core.contract import Services, ShadingBackend
 from studio_core.document import Document
 from studio_core.errors import LucarneError
@@ -39,6 +40,8 @@ from studio_ui.journal import Journal
 from studio_ui.main_window import MainWindow
 from studio_ui.settings import Settings, state_folder
 from studio_ui.tasks import Tasks
+
+COMPILE_AFTER = 8_000  # ms after the start: when the first picture is there
 
 
 class PluginShading:
@@ -132,6 +135,7 @@ def run_window(path: Path | None, *, read_only: bool = False) -> int:
     settings = Settings(state_folder())
     with _crash_log(settings.folder) as crashed:
         studio = assemble(settings=settings)
+        compiling: list[subprocess.Popen[bytes]] = []
         before, sys.excepthook = sys.excepthook, _hook(studio.context.journal)
         try:
             studio.window.canvas.start()
@@ -141,9 +145,14 @@ def run_window(path: Path | None, *, read_only: bool = False) -> int:
                     "The program crashed last time; its report is here.", "warning", crashed
                 )
             _first(studio, path, read_only)
+            studio.bridge.later(
+                COMPILE_AFTER, lambda: studio.executors[1].submit(lambda: _compile(compiling))
+            )
             return application.exec()
         finally:
             studio.close()
+            for process in compiling:
+                process.terminate()
             sys.excepthook = before
 
 
@@ -160,6 +169,13 @@ def _first(studio: Studio, path: Path | None, read_only: bool) -> None:
         files.offer_unsaved()
 
     studio.bridge.later(0, start)
+
+
+def _compile(started: list[subprocess.Popen[bytes]]) -> None:
+    """Compile kernels that no picture has needed so far, in a process of its own."""
+    process = compile_ahead.start()
+    if process is not None:
+        started.append(process)
 
 
 def _warm(context: Context, compute: Executor, files: Executor, bridge: Bridge) -> None:
