@@ -76,7 +76,7 @@ def gather_light(
     """
     leaves = len(leaf) - 1
     words = np.empty(leaves >> 6, np.uint64)
-    runs = np.empty(leaves + 2, pool.dtype)
+    room = np.empty(leaves + 2, pool.dtype)
     before = np.empty((leaves // 2 + 2, SUMS), np.float32)
     index = np.empty(leaves // BLOCK + 1, np.int64)
     total = np.empty(SUMS, np.float32)
@@ -90,10 +90,10 @@ def gather_light(
             return number - begin
         p = points[number]
         nx, ny, nz = normals[p, 0], normals[p, 1], normals[p, 2]
+        runs = room
         if known_length[p] >= 0:
             count = known_length[p] // 2
-            for i in range(2 * count):
-                runs[i] = known[known_start[p] + i]
+            runs = known[known_start[p] : known_start[p] + known_length[p]]
         else:
             words[:] = ONES if length[p] + coarse_length[p] > 0 else np.uint64(0)
             hide(pool, start[p], length[p], skip[row[p], object_of[p]], words)

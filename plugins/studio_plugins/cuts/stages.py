@@ -130,7 +130,8 @@ class VisibilityStage:
                 between, core = parents(surfaces.mesh), mask.copy()
                 descend(between, core)
                 points = np.flatnonzero(core)
-            self._look(points, self._glowing(inputs[Lighting], k), job)
+            if len(store.unknown(points)):
+                self._look(points, self._glowing(inputs[Lighting], k), job)
         else:
             glow = self._glowing(inputs[Lighting], k)
             for level in self._steps(points, job):
