@@ -178,7 +178,8 @@ def render(options: argparse.Namespace, program: Headless) -> None:
         program.say(f"{options.project} shows no mesh: the picture is background alone")
     if not any(scene.shown(light.id) for light in scene.of(Light)):
         program.say(f"{options.project} has no light: the picture is black")
-    view = dataclasses.replace(scene_view(scene, options.camera, width, height), antialias=options.antialias)
+    view = scene_view(scene, options.camera, width, height)
+    view = dataclasses.replace(view, antialias=options.antialias, fine_edges=options.antialias > 1)
     with program.job("Rendering") as job:
         places = options.measure or 0
         made, error = measured_picture(scene, view, backend, params, program.services, places, job)

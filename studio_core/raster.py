@@ -37,7 +37,16 @@ from studio_core.scene.diff import Aspect
 from studio_core.scene.nodes import Environment, Light, Scene
 from studio_core.scene.transform import rotation_matrix
 from studio_core.session import View
-from studio_core.shading.artifacts import TERMS, Backdrop, Hits, Picture, Radiance, Surfaces, VertexColours
+from studio_core.shading.artifacts import (
+    TERMS,
+    Backdrop,
+    EdgeHits,
+    Hits,
+    Picture,
+    Radiance,
+    Surfaces,
+    VertexColours,
+)
 from studio_core.shading.coefficients import Coefficients, CoefficientTable, Maps
 from studio_core.shading.frame import Frame
 from studio_core.shading.job import Job
@@ -107,6 +116,21 @@ class _Layer:
 
 
 @dataclass(frozen=True, eq=False)
+class _Part:
+    """Pixels of a picture (empty: all) and the layers of hits that they are made of."""
+
+    pixels: I64
+    layers: tuple[_Layer, ...]
+
+    def of_picture(self, own: I64) -> I64:
+        """Which samples of the picture (in which all pixels have as many) some of this part are."""
+        if not len(self.pixels):
+            return own
+        hits = self.layers[0].hits
+        return EdgeHits(self.pixels, hits).of_picture(own if len(own) else np.arange(len(hits.face)))
+
+
+@dataclass(frozen=True, eq=False)
 class _Outline:
     coverage: F32
     node: I32
@@ -144,9 +168,9 @@ class Compositor:
         self._workers = workers
         self._sides: Kept[tuple[U32, F32]] = Kept()
         self._density: Kept[F32] = Kept()
-        self._layers: Kept[tuple[_Layer, ...]] = Kept()
+        self._parts: Kept[tuple[_Part, ...]] = Kept()
         self._outline: Kept[_Outline] = Kept()
-        self._background: Kept[F32] = Kept()
+        self._background: Kept[list[F32]] = Kept()
         self._sky: Kept[F32] = Kept()
         self._corners: Kept[npt.NDArray[np.bool_]] = Kept()
 
@@ -155,25 +179,21 @@ class Compositor:
     ) -> Picture:
         """Linear (H, W, 3) with the environment behind where it is to be seen."""
         surfaces, mesh, view = radiance.surfaces, radiance.surfaces.mesh, hits.view
-        layers = self._layers(lambda: _layers(hits, surfaces), hits, surfaces.opacity, mesh.face_material)
+        parts = self._parts(lambda: _parts(hits, surfaces), hits, surfaces.opacity, mesh.face_material)
         outline = self._outline(lambda: self._look(hits, surfaces, job), hits, mesh.faces, mesh.object)
         environment = shown_environment(scene)
-        backdrop, background = None, NO_COLOUR
+        backdrop, backgrounds = None, [NO_COLOUR] * len(parts)
         if environment is not None and environment.background:
             sky = backdrop = self._backdrop(environment)
-            background = self._background(lambda: self._behind(sky, layers, job), layers, environment)
+            backgrounds = self._background(
+                lambda: [self._behind(sky, part, job) for part in parts], parts, environment
+            )
         faces = self._faces(surfaces, view, table.maps)
         tables = self._tables(scene, radiance, table, view, job)
-        given = (hits.face, hits.u, hits.v, hits.distance, *faces, *tables)
-        alone = hits.samples == 1 and not hits.behind  # then the background fills what is not hit
-
-        def look(start: int, stop: int, values: F32) -> None:
-            shade_hits(start, stop, *given, background if alone else NO_COLOUR, values)
-
-        out = self._averaged(layers[0], view, look, NO_COLOUR if alone else background, job)
-        for layer in layers[1:]:
-            values = self._hits(layer.hits, faces, tables, job)
-            add_samples(layer.samples, hits.samples**2, layer.weight, values, out)
+        out = self._pixels(parts[0], backgrounds[0], faces, tables, job)
+        for part, background in zip(parts[1:], backgrounds[1:], strict=True):
+            finer = tables._replace(pixel_angle=_pixel_angle(part.layers[0].hits.view))
+            out[part.pixels] = self._pixels(part, background, faces, finer, job)
         linear = out.reshape(view.height, view.width, 3)
         corners = self._corners(lambda: visible_vertices(surfaces, hits), hits, mesh)
         colours = VertexColours(tables.record, tables.sums, corners, table.maps, backdrop)
@@ -195,6 +215,21 @@ class Compositor:
         given = (hits.face, hits.u, hits.v, hits.distance, *faces, *looks, *layout)
         hit_coefficients(*given, out)
         return out.reshape(-1, TERMS, 3)
+
+    def _pixels(self, part: _Part, background: F32, faces: _Faces, tables: _Tables, job: Job | None) -> F32:
+        """(P, 3) the pixels of a part; background (P, 3) is added, or nothing."""
+        layers, hits = part.layers, part.layers[0].hits
+        given = (hits.face, hits.u, hits.v, hits.distance, *faces, *tables)
+        alone = hits.samples == 1 and not hits.behind  # then the background fills what is not hit
+
+        def look(start: int, stop: int, values: F32) -> None:
+            shade_hits(start, stop, *given, background if alone else NO_COLOUR, values)
+
+        out = self._averaged(layers[0], look, NO_COLOUR if alone else background, job)
+        for layer in layers[1:]:
+            values = self._hits(layer.hits, faces, tables, job)
+            add_samples(layer.samples, hits.samples**2, layer.weight, values, out)
+        return out
 
     def _hits(self, hits: Hits, faces: _Faces, tables: _Tables, job: Job | None) -> F32:
         out = np.empty((len(hits.face), 3), np.float32)
@@ -256,51 +291,58 @@ class Compositor:
 
     def _look(self, hits: Hits, surfaces: Surfaces, job: Job | None) -> _Outline:
         mesh, view = surfaces.mesh, hits.view
+
+        def outline(seen: Hits) -> tuple[F32, I32, F32]:
+            count = len(seen.face) // seen.samples**2
+            made = (np.empty(count, np.float32), np.empty(count, np.int32), np.empty(count, np.float32))
+
+            def look(start: int, stop: int) -> None:
+                rays = (seen.samples**2, seen.face, seen.distance, mesh.faces, mesh.object)
+                outline_pixels(start, stop, *rays, *made)
+
+            self._workers.run(count, PIXELS, look, job)
+            return made
+
+        coverage, node, distance = outline(hits)
+        if hits.edges is not None:
+            coverage[hits.edges.pixels] = outline(hits.edges.hits)[0]
         shape = (view.height, view.width)
-        coverage, distance = np.empty((2, *shape), np.float32)
-        node = np.empty(shape, np.int32)
-        flat = (coverage.reshape(-1), node.reshape(-1), distance.reshape(-1))
-
-        def look(start: int, stop: int) -> None:
-            rays = (hits.samples**2, hits.face, hits.distance, mesh.faces, mesh.object)
-            outline_pixels(start, stop, *rays, *flat)
-
-        self._workers.run(node.size, PIXELS, look, job)
-        return _Outline(coverage, node, distance)
+        return _Outline(coverage.reshape(shape), node.reshape(shape), distance.reshape(shape))
 
     def _backdrop(self, environment: Environment) -> Backdrop:
         pixels = self._sky(lambda: readonly(linear_rgb(environment.image), np.float32), environment.image)
         to_picture = environment.rotation().matrix()[:3, :3].T
         return Backdrop(pixels, to_picture.astype(np.float32), np.array(environment.gain(), np.float32))
 
-    def _behind(self, backdrop: Backdrop, layers: tuple[_Layer, ...], job: Job | None) -> F32:
-        """(P, 3) what of the environment is seen beside objects and through them."""
-        view = layers[0].hits.view
+    def _behind(self, backdrop: Backdrop, part: _Part, job: Job | None) -> F32:
+        """(P, 3) what of the environment the pixels of a part see beside objects and through them."""
+        layers, view = part.layers, part.layers[0].hits.view
+        samples = part.of_picture(EVERY)
         lens = pinhole(view)
         turn = np.ascontiguousarray(backdrop.turn @ rotation_matrix(view.transform.rotation), np.float32)
         sky = (turn, backdrop.pixels, backdrop.gain)
 
         def look(start: int, stop: int, values: F32) -> None:
-            background_hits(start, stop, lens, EVERY, layers[0].hits.face, *sky, values)
+            background_hits(start, stop, lens, samples, layers[0].hits.face, *sky, values)
 
-        out = self._averaged(layers[0], view, look, NO_COLOUR, job)
+        out = self._averaged(layers[0], look, NO_COLOUR, job)
         for layer in layers[1:]:
             values = np.empty((len(layer.samples), 3), np.float32)
-            background_hits(0, len(values), lens, layer.samples, layer.hits.face, *sky, values)
+            place = part.of_picture(layer.samples)
+            background_hits(0, len(values), lens, place, layer.hits.face, *sky, values)
             add_samples(layer.samples, layer.hits.samples**2, layer.weight, values, out)
         return out
 
     def _averaged(
         self,
         layer: _Layer,
-        view: View,
         look: Callable[[int, int, F32], None],
         background: F32,
         job: Job | None,
     ) -> F32:
         """(P, 3) pixels whose samples `look` writes; background (P, 3), or nothing, is added."""
         count = layer.hits.samples**2
-        out = np.empty((view.width * view.height, 3), np.float32)
+        out = np.empty((len(layer.hits.face) // count, 3), np.float32)
 
         def fill(start: int, stop: int) -> None:
             if count == 1 and not len(layer.weight) and not len(background):
@@ -322,6 +364,14 @@ def _add_light(given: tuple[Any, ...], start: int, stop: int) -> None:
 def _pixel_angle(view: View) -> float:
     """Radians between samples, about."""
     return float(2 * np.tan(np.radians(view.fov) / 2) / (view.height * view.antialias))
+
+
+def _parts(hits: Hits, surfaces: Surfaces) -> tuple[_Part, ...]:
+    """All pixels, then those whose hits stand in the place of theirs."""
+    every = _Part(EVERY, _layers(hits, surfaces))
+    if hits.edges is None or not len(hits.edges.pixels):
+        return (every,)
+    return (every, _Part(hits.edges.pixels, _layers(hits.edges.hits, surfaces)))
 
 
 def _layers(hits: Hits, surfaces: Surfaces) -> tuple[_Layer, ...]:

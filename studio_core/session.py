@@ -20,7 +20,8 @@ from studio_core.signal import Signal
 class View:
     """A pinhole camera: world from camera, vertical angle in degrees, pixels, orbit distance in metres.
 
-    A pixel is the mean of `antialias`² samples. Raises ValueError for a view of nothing.
+    A pixel is the mean of `antialias`² samples; with `fine_edges` those in which something ends have 16 where
+    that is more. Raises ValueError for a view of nothing.
     """
 
     transform: Transform = IDENTITY
@@ -29,6 +30,7 @@ class View:
     height: int = 540
     focus: float = 3.0
     antialias: int = 2
+    fine_edges: bool = False
 
     def __post_init__(self) -> None:
         if min(self.width, self.height, self.antialias) < 1 or not 0 < self.fov < 180:

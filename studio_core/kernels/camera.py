@@ -105,6 +105,7 @@ def first_hits(
     u: F32,
     v: F32,
     distance: F32,
+    compact: bool,
     start: int,
     stop: int,
 ) -> None:
@@ -113,7 +114,8 @@ def first_hits(
     The picture's grid of samples is cut into tiles of 4 × 2, one packet each, numbered row by row. Done
     are tiles[start:stop], or tiles start … stop−1 where `tiles` is empty. face gets face_offsets[object] +
     the object's face, or −1; u, v weigh the face's second and third corner; distance is inf where nothing
-    is hit. A tile's results depend on nothing but the tile.
+    is hit. A tile's results depend on nothing but the tile. They go to where the samples are in the picture,
+    or, `compact`, to 8 places for each tile, row by row.
     """
     packet, valid = new_packet()
     words = packet.view(np.uint32)
@@ -144,7 +146,10 @@ def first_hits(
             packet[TFAR, lane] = np.float32(np.inf)
             inside = x < columns and y < rows
             valid[lane] = -1 if inside else 0
-            place[lane] = sample_at(x, y, columns, n) if inside else -1
+            if compact:
+                place[lane] = 8 * index + lane if inside else -1
+            else:
+                place[lane] = sample_at(x, y, columns, n) if inside else -1
         clear_hits(packet)
         call_address(intersect8, valid, scene, packet, arguments)
         for lane in range(8):
@@ -178,4 +183,18 @@ def tiles_in(pinhole: F64, boxes: I64) -> I64:
         for row in range(top, bottom):
             for column in range(left, right):
                 touched[row * across + column] = True
+    return np.flatnonzero(touched)
+
+
+@kernel
+def pixels_of(pinhole: F64, tiles: I64) -> I64:
+    """The pixels, rising, of which a sample lies in one of the tiles."""
+    width, n, height = int(pinhole[0]), int(pinhole[1]), int(pinhole[4])
+    across = tiles_across(pinhole)
+    touched = np.zeros(width * height, np.bool_)
+    for index in range(len(tiles)):
+        left, top = (tiles[index] % across) * TILE_WIDTH, (tiles[index] // across) * TILE_HEIGHT
+        for y in range(top, min(top + TILE_HEIGHT, height * n)):
+            for x in range(left, min(left + TILE_WIDTH, width * n)):
+                touched[(y // n) * width + x // n] = True
     return np.flatnonzero(touched)

@@ -152,7 +152,8 @@ class Hits:
 
     `face` is an index into `mesh.faces` or -1 (nothing); barycentrics (u, v) weigh the second and third
     corner. `behind` holds what transparent surfaces in front leave to be seen: further layers, each with
-    the sample's index. `traced` counts the rays that were needed.
+    the sample's index. `edges` are further hits of the pixels in which something ends, and stand in their
+    place in the picture. `traced` counts the rays that were needed.
     """
 
     view: View
@@ -163,6 +164,20 @@ class Hits:
     distance: F32
     behind: tuple[tuple[npt.NDArray[np.int64], Hits], ...] = ()
     traced: int = 0
+    edges: EdgeHits | None = None
+
+
+@dataclass(frozen=True)
+class EdgeHits:
+    """Hits of some pixels (E,), rising, one after another as a picture with more samples has them."""
+
+    pixels: npt.NDArray[np.int64]
+    hits: Hits
+
+    def of_picture(self, own: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
+        """Which samples of the picture some of the hits' own are."""
+        count = self.hits.samples**2
+        return np.asarray(self.pixels[own // count] * count + own % count)
 
 
 @dataclass(frozen=True)
@@ -289,6 +304,7 @@ __all__ = [
     "Backdrop",
     "Casters",
     "ChosenPoints",
+    "EdgeHits",
     "Error",
     "Hits",
     "Lamp",

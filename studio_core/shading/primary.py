@@ -9,21 +9,32 @@ import numpy as np
 import numpy.typing as npt
 
 from studio_core.contract import Services
-from studio_core.kernels.camera import first_hits, sample_directions, tiles_across, tiles_down, tiles_in
+from studio_core.kernels.camera import (
+    first_hits,
+    pixels_of,
+    sample_directions,
+    tiles_across,
+    tiles_down,
+    tiles_in,
+)
+from studio_core.kernels.edges import mark_edges
 from studio_core.kernels.facing import mark_faces, mark_vertices
 from studio_core.kernels.raycast import RayCaster
+from studio_core.parallel import Workers
 from studio_core.scene.diff import Aspect
 from studio_core.scene.transform import Transform, rotation_matrix
 from studio_core.session import View
-from studio_core.shading.artifacts import Casters, Hits, Surfaces
+from studio_core.shading.artifacts import Casters, EdgeHits, Hits, Surfaces
 from studio_core.shading.frame import Frame
 from studio_core.shading.job import Job
 from studio_core.shading.pipeline import Inputs
 
+F32 = npt.NDArray[np.float32]
 F64 = npt.NDArray[np.float64]
 I64 = npt.NDArray[np.int64]
 
 CHUNK = 1 << 11  # tiles
+EDGE_SAMPLES = 4  # by itself, in pixels in which something ends: then a pixel is two tiles
 LAYERS = 6  # most transparent surfaces looked through
 WORTH_KEEPING = 0.7  # above this share of stale tiles all are traced
 EVERY = np.zeros(0, np.int64)
@@ -37,6 +48,7 @@ class _Made:
     caster: RayCaster
     face_offsets: I64
     transforms: tuple[Transform, ...]
+    face_material: npt.NDArray[np.int32]
     clear: npt.NDArray[np.bool_]  # faces that are looked through; empty: none
 
 
@@ -63,17 +75,22 @@ class PrimaryStage:
         tiles = EVERY
         if old is not None:
             moved = _moved(old, casters)
-            if not moved and np.array_equal(clear, old.clear):
+            if not moved and _same_materials(old, clear, surfaces):
                 return old.hits
             tiles = tiles_in(lens, _screen_boxes(moved, old, surfaces, casters, view))
             if len(tiles) > WORTH_KEEPING * tiles_across(lens) * tiles_down(lens):
                 old = None
-        hits = self._first(view, lens, surfaces, casters.primary, old.hits if old else None, tiles, job)
+        caster = casters.primary
+        hits = self._first(view, lens, surfaces, caster, old.hits if old else None, tiles, job)
         if len(clear):
             every = np.arange(len(hits.face))
-            hits = self._beyond(hits, clear, surfaces, casters.primary, every, lens, 0, job)
-        offsets = surfaces.mesh.face_offsets
-        self._made = _Made(hits, casters.primary, offsets, casters.transforms, clear)
+            hits = self._beyond(hits, clear, surfaces, caster, every, lens, 0, job)
+        if view.fine_edges and view.antialias < EDGE_SAMPLES:
+            kept = old.hits.edges if old is not None else None
+            edges = self._edges(hits, kept, tiles, clear, surfaces, caster, job)
+            hits = dataclasses.replace(hits, edges=edges, traced=hits.traced + edges.hits.traced)
+        mesh = surfaces.mesh
+        self._made = _Made(hits, caster, mesh.face_offsets, casters.transforms, mesh.face_material, clear)
         return hits
 
     def _first(
@@ -93,35 +110,77 @@ class PrimaryStage:
             face = np.empty(size, np.int32)
             u, v, distance = (np.empty(size, np.float32) for _ in range(3))
         elif not len(tiles):
-            return dataclasses.replace(old, behind=(), traced=0)
+            return dataclasses.replace(old, behind=(), traced=0, edges=None)
         else:
             count = len(tiles)
             face, u, v, distance = old.face.copy(), old.u.copy(), old.v.copy(), old.distance.copy()
-        eye = caster.local(view.transform.translation)
-        handles, offsets = caster.handles(), surfaces.mesh.face_offsets
-
-        def look(start: int, stop: int) -> None:
-            first_hits(
-                handles.intersect8,
-                handles.scene,
-                eye,
-                lens,
-                handles.face_start,
-                handles.face_ids,
-                offsets,
-                tiles,
-                face,
-                u,
-                v,
-                distance,
-                start,
-                stop,
-            )
-
-        self._workers.run(count, CHUNK, look, job)
+        self._trace(view, lens, surfaces, caster, count, tiles, (face, u, v, distance), False, job)
         traced = min(8 * count, size)
         caster.count(traced)
         return Hits(view, view.antialias, face, u, v, distance, traced=traced)
+
+    def _trace(
+        self,
+        view: View,
+        lens: F64,
+        surfaces: Surfaces,
+        caster: RayCaster,
+        count: int,
+        tiles: I64,
+        into: tuple[npt.NDArray[np.int32], F32, F32, F32],
+        compact: bool,
+        job: Job,
+    ) -> None:
+        eye = caster.local(view.transform.translation)
+        handles = caster.handles()
+        faces = (handles.face_start, handles.face_ids, surfaces.mesh.face_offsets)
+
+        def look(start: int, stop: int) -> None:
+            given = (handles.intersect8, handles.scene, eye, lens, *faces, tiles)
+            first_hits(*given, *into, compact, start, stop)
+
+        self._workers.run(count, CHUNK, look, job)
+
+    def _edges(
+        self,
+        hits: Hits,
+        kept: EdgeHits | None,
+        tiles: I64,
+        clear: npt.NDArray[np.bool_],
+        surfaces: Surfaces,
+        caster: RayCaster,
+        job: Job,
+    ) -> EdgeHits:
+        """Hits of pixels in which something ends; those of `kept` that lie in none of the tiles are taken."""
+        view = dataclasses.replace(hits.view, antialias=EDGE_SAMPLES, fine_edges=False)
+        lens, pixels, count = pinhole(view), edge_pixels(hits, surfaces, self._workers, job), EDGE_SAMPLES**2
+        known, place = np.zeros(len(pixels), np.bool_), np.zeros(len(pixels), np.int64)
+        if kept is not None and len(kept.pixels):
+            place = np.searchsorted(kept.pixels, pixels).clip(max=len(kept.pixels) - 1)
+            known = kept.pixels[place] == pixels
+            known &= ~np.isin(pixels, pixels_of(pinhole(hits.view), tiles))
+        asked = pixels[~known]
+        # a pixel is two tiles: the hits of one after the other are its samples row by row
+        upper = asked // view.width * (2 * view.width) + asked % view.width
+        halves = np.stack([upper, upper + view.width], axis=1).reshape(-1)
+        size = 8 * len(halves)
+        face = np.empty(size, np.int32)
+        u, v, distance = (np.empty(size, np.float32) for _ in range(3))
+        if size:
+            given = (len(halves), halves, (face, u, v, distance), True, job)
+            self._trace(view, lens, surfaces, caster, *given)
+            caster.count(size)
+        if kept is not None and known.any():
+            source = np.where(known, place, np.cumsum(~known) - 1 + len(kept.pixels))
+            rows = (source[:, None] * count + np.arange(count)).reshape(-1)
+            old = kept.hits
+            face, distance = np.append(old.face, face)[rows], np.append(old.distance, distance)[rows]
+            u, v = np.append(old.u, u)[rows], np.append(old.v, v)[rows]
+        fine = Hits(view, EDGE_SAMPLES, face, u, v, distance, traced=size)
+        if len(clear):
+            every = EdgeHits(pixels, fine).of_picture(np.arange(len(fine.face)))
+            fine = self._beyond(fine, clear, surfaces, caster, every, lens, 0, job)
+        return EdgeHits(pixels, fine)
 
     def _beyond(
         self,
@@ -162,6 +221,40 @@ def _clear_faces(surfaces: Surfaces) -> npt.NDArray[np.bool_]:
         return np.zeros(0, np.bool_)
     made: npt.NDArray[np.bool_] = surfaces.opacity[surfaces.mesh.face_material] < 1
     return made
+
+
+def edge_pixels(hits: Hits, surfaces: Surfaces, workers: Workers, job: Job | None = None) -> I64:
+    """(E,) pixels, rising, in which something that is seen ends, through what is transparent too.
+
+    That is an object, a material, what stands before something further away, or a smooth surface (a crease).
+    """
+    mesh, view = surfaces.mesh, hits.view
+    marked = np.zeros(view.width * view.height, np.bool_)
+    face, u, v, distance = hits.face, hits.u, hits.v, hits.distance
+    rests, samples = hits.behind, EVERY
+
+    def mark(start: int, stop: int) -> None:
+        seen = (hits.samples, face, u, v, distance)
+        mark_edges(
+            start, stop, view.width, *seen, mesh.faces, mesh.normals, mesh.object, mesh.face_material, marked
+        )
+
+    workers.run(len(marked), CHUNK, mark, job)
+    while rests:
+        ((index, rest),) = rests
+        samples = samples[index] if len(samples) else index
+        face, u, v, distance = face.copy(), u.copy(), v.copy(), distance.copy()
+        face[samples], distance[samples] = rest.face, rest.distance
+        u[samples], v[samples] = rest.u, rest.v
+        workers.run(len(marked), CHUNK, mark, job)
+        rests = rest.behind
+    return np.flatnonzero(marked)
+
+
+def _same_materials(old: _Made, clear: npt.NDArray[np.bool_], surfaces: Surfaces) -> bool:
+    if not np.array_equal(clear, old.clear):
+        return False
+    return old.hits.edges is None or np.array_equal(old.face_material, surfaces.mesh.face_material)
 
 
 def _comparable(
@@ -243,7 +336,7 @@ def visible_vertices(surfaces: Surfaces, hits: Hits) -> npt.NDArray[np.bool_]:
     """(V,) the corners of every face that a sample sees, on the side it sees."""
     mesh = surfaces.mesh
     seen, touched = np.zeros(len(mesh.positions), np.bool_), np.zeros(len(mesh.faces), np.bool_)
-    layers = [hits]
+    layers = [hits] if hits.edges is None else [hits, hits.edges.hits]
     for layer in layers:
         mark_faces(layer.face, touched)
         layers.extend(rest for _, rest in layer.behind)

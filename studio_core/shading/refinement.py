@@ -313,4 +313,7 @@ def located(hits: Hits, tree: FaceTree, workers: Workers, job: Job | None = None
 
     workers.run(count, CHUNK, carry, job)
     behind = tuple((samples, located(rest, tree, workers, job)) for samples, rest in hits.behind)
-    return dataclasses.replace(hits, face=face, u=place[0], v=place[1], behind=behind)
+    edges = hits.edges
+    if edges is not None:
+        edges = dataclasses.replace(edges, hits=located(edges.hits, tree, workers, job))
+    return dataclasses.replace(hits, face=face, u=place[0], v=place[1], behind=behind, edges=edges)

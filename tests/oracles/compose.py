@@ -106,4 +106,12 @@ def picture(scene, radiance, hits, registry) -> tuple[Array, npt.NDArray[np.bool
         if footprint is not None:
             step = np.log2(max(footprint, 1e-9)) + 0.5
             unsure[sample // n2] |= abs(step - np.round(step)) < 1e-4
+    if hits.edges is not None:
+        finer, fine = Painter(scene, radiance, hits.edges.hits, registry), hits.edges.hits
+        count = len(fine.face) // max(len(hits.edges.pixels), 1)
+        for row, pixel in enumerate(hits.edges.pixels):
+            colours = [finer.sample(fine, row * count + k, pixel * count + k) for k in range(count)]
+            out[pixel] = np.mean([colour for colour, _ in colours], axis=0)
+            steps = [np.log2(max(f, 1e-9)) + 0.5 for _, f in colours if f is not None]
+            unsure[pixel] = any(abs(step - np.round(step)) < 1e-4 for step in steps)
     return out.reshape(view.height, view.width, 3), unsure.reshape(view.height, view.width)

@@ -100,9 +100,9 @@ def light_sums(scene, surfaces, hits, seed=0):
     return Radiance(surfaces, None, layers, valid, 1024, True)
 
 
-def view_of(scene, width=24, height=17, antialias=1):
+def view_of(scene, width=24, height=17, antialias=1, fine=False):
     view = View.of(next(scene.of(Camera)), scene, width, height)
-    return dataclasses.replace(view, antialias=antialias)
+    return dataclasses.replace(view, antialias=antialias, fine_edges=fine)
 
 
 @pytest.mark.parametrize("antialias", [1, 2])
@@ -123,6 +123,43 @@ def test_pictures_are_those_of_the_oracle(host, workers, look, antialias):
     ):
         assert node == (surfaces.mesh.object[surfaces.mesh.faces[first, 0]] if first >= 0 else -1)
         assert distance == (hits.distance[pixel * n2] if first >= 0 else np.inf)
+
+
+@pytest.mark.parametrize("look", LOOKS)
+def test_pictures_with_fine_edges_are_those_of_the_oracle(host, workers, look):
+    scene = room(look)
+    _, surfaces, hits = Studio(host, workers).see(scene, view_of(scene, 18, 13, fine=True))
+    assert len(hits.edges.pixels) > 20
+    radiance = light_sums(scene, surfaces, hits)
+    made = Compositor(workers).picture(scene, radiance, hits, CoefficientTable(host)(scene, surfaces))
+    expected, unsure = oracle.picture(scene, radiance, hits, host)
+    assert unsure.mean() < 0.05
+    np.testing.assert_allclose(made.linear[~unsure], expected[~unsure], rtol=3e-4, atol=3e-5)
+
+
+@pytest.mark.parametrize("background", [False, True])
+@pytest.mark.parametrize("look", LOOKS)
+def test_fine_edges_are_the_pixels_of_sixteen_samples_and_all_others_as_before(
+    host, workers, look, background
+):
+    scene = room(look)
+    scene = scene.with_nodes(dataclasses.replace(next(scene.of(Environment)), background=background))
+    whole_view, view = view_of(scene, 60, 41, 4), view_of(scene, 60, 41, 2)
+    _, surfaces, fine = Studio(host, workers).see(scene, dataclasses.replace(view, fine_edges=True))
+    plain, whole = (Studio(host, workers).see(scene, each)[2] for each in (view, whole_view))
+    seen = dataclasses.replace(light_sums(scene, surfaces, fine), valid=np.ones(len(surfaces.mesh), np.bool_))
+    table = CoefficientTable(host)(scene, surfaces)
+    made, two, four = (Compositor(workers).picture(scene, seen, hits, table) for hits in (fine, plain, whole))
+    ended = np.zeros(60 * 41, np.bool_)
+    ended[fine.edges.pixels] = True
+    ended = ended.reshape(41, 60)
+    assert 0.02 < ended.mean() < 0.5
+    for name in ("linear", "coverage"):
+        ours = getattr(made, name)
+        np.testing.assert_array_equal(ours[ended], getattr(four, name)[ended])
+        np.testing.assert_array_equal(ours[~ended], getattr(two, name)[~ended])
+    np.testing.assert_array_equal(made.node, two.node)
+    np.testing.assert_array_equal(made.distance, two.distance)
 
 
 @pytest.mark.parametrize("look", LOOKS)
@@ -158,7 +195,7 @@ def texture(look, seed):
 
 OTHER_SKY = Image(RNG.random((8, 16, 3)).astype(np.float32))
 KINDS = ["light", "gain", "hidden", "look", "colour", "texture", "opacity"]
-KINDS += ["sky", "background", "image", "assign", "move", "view", "eye", "size"]
+KINDS += ["sky", "background", "image", "assign", "move", "view", "eye", "size", "edges"]
 
 
 def changed(scene, view, seed, kind, number):
@@ -202,6 +239,8 @@ def changed(scene, view, seed, kind, number):
         return scene, dataclasses.replace(view, fov=30.0 + 5 * number), seed
     if kind == "size":
         return scene, dataclasses.replace(view, width=16 + number, antialias=1 + number % 2), seed
+    if kind == "edges":
+        return scene, dataclasses.replace(view, fine_edges=number % 2 == 1), seed
     return scene, view, seed
 
 
@@ -220,7 +259,7 @@ def test_what_is_kept_never_shows(host, workers, steps):
 def check_kept(host, workers, scene, steps):
     """A stage that has seen all steps draws what a new one does."""
     studio, kept = Studio(host, workers), PictureStage(Services(workers, host))
-    view, seed = view_of(scene, 20, 13), 0
+    view, seed = view_of(scene, 20, 13, fine=len(steps) % 2 == 0), 0
     for kind, number in [("", 0), *steps]:
         scene, view, seed = changed(scene, view, seed, kind, number)
         frame, surfaces, hits = studio.see(scene, view)
@@ -269,7 +308,7 @@ def test_vertices_that_were_not_lit_are_dark(host, workers):
 def test_the_number_of_threads_changes_nothing(host, workers, look):
     scene = room(look)
     with Workers(1) as alone:
-        _, surfaces, hits = Studio(host, alone).see(scene, view_of(scene, 160, 120, 2))
+        _, surfaces, hits = Studio(host, alone).see(scene, view_of(scene, 160, 120, 2, fine=True))
         radiance, table = light_sums(scene, surfaces, hits), CoefficientTable(host)(scene, surfaces)
         one = Compositor(alone).picture(scene, radiance, hits, table)
     two = Compositor(workers).picture(scene, radiance, hits, table)

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from hypothesis import given
 from hypothesis import strategies as st
 
-from studio_ui.pace import ALIKE, LEVELS, QUICK, SLOW, Pace
+from studio_ui.pace import ALIKE, KEPT, LEVELS, QUICK, SLOW, Pace
 
 
 def drag(pace: Pace, seconds: Callable[[int], float], pictures: int = 30) -> list[int]:
@@ -57,4 +57,39 @@ def test_the_first_picture_of_a_motion_does_not_count() -> None:
         pace.took(0.5)
         pace.took(0.05)
         pace.rest()
+    assert pace.pixels == LEVELS[1]
+
+
+def gesture(pace: Pace, kept: float, other: float, pictures: int = 12) -> list[bool]:
+    """Whether each picture of one motion was kept as at rest; how long both kinds take."""
+    made = []
+    for _ in range(pictures):
+        made.append(pace.keeps)
+        pace.took(kept if pace.keeps else other, kept=pace.keeps)
+    pace.rest()
+    return made
+
+
+def test_quick_pictures_stay_as_at_rest_and_slow_ones_do_not() -> None:
+    pace = Pace()
+    assert all(gesture(pace, KEPT / 2, 0.01))
+    for _ in range(3):
+        assert gesture(pace, 2 * KEPT, 0.01) == [True] * ALIKE + [False] * (12 - ALIKE)
+    assert pace.pixels == LEVELS[-1], "those that were not kept were quick"
+
+
+def test_where_fewer_pixels_do_not_help_they_are_kept_until_that_may_have_changed() -> None:
+    pace = Pace()
+    assert not all(gesture(pace, 0.2, 0.19))
+    assert all(gesture(pace, 0.2, 0.19))
+    assert all(gesture(pace, KEPT / 2, 0.01))
+    assert not all(gesture(pace, 0.2, 0.01)), "tried again"
+
+
+def test_one_slow_picture_that_was_kept_changes_nothing() -> None:
+    pace = Pace()
+    for _ in range(10):
+        for seconds in (*[KEPT / 2] * (ALIKE - 1), 1.0):
+            pace.took(seconds, kept=True)
+    assert pace.keeps
     assert pace.pixels == LEVELS[1]

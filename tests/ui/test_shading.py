@@ -6,13 +6,16 @@ import threading
 import time
 
 import numpy as np
+import pytest
 from ui_support import Driver, Make, room
 
-from studio_core.edits import Move, SetFields, SetMaterial
+from studio_core.edits import Add, Edit, Move, SetFields, SetMaterial
 from studio_core.scene.diff import Aspect
+from studio_core.scene.nodes import PointLamp
 from studio_core.scene.transform import Transform
 from studio_core.session import View
 from studio_ui.feed import Freshness
+from studio_ui.pace import ALIKE, KEPT
 
 
 def shift(driver: Driver, x: float) -> None:
@@ -158,6 +161,7 @@ def test_while_dragging_pictures_are_quick_and_at_rest_they_are_fine(driver: Dri
     driver.settle()
     view = driver.fake.frames[-1].view
     assert view.antialias == 2
+    assert view.fine_edges
     assert (view.width, view.height) == driver.feed.size
 
 
@@ -169,18 +173,86 @@ def test_other_pixels_are_another_view_to_the_stages(driver: Driver) -> None:
         request(frame, changes),
     )[1]
     driver.feed.hold()
-    for value in (0.7, 0.8):
-        driver.document.apply(SetMaterial("red", {"roughness": value}))
+    for x in (1.1, 1.2):
+        shift(driver, x)
         driver.until(lambda: driver.feed.last.moving and not driver.feed.busy)
     (small, first), (same, then) = asked
     assert small.width < driver.feed.size[0]
+    assert not small.fine_edges
     assert first & Aspect.VIEW
-    assert first & Aspect.MATERIAL
+    assert first & Aspect.TRANSFORM
     assert same == small
     assert not then & Aspect.VIEW, "primary rays are kept"
     driver.feed.release()
     driver.settle()
     assert asked[-1][1] & Aspect.VIEW
+
+
+def asked_for(driver: Driver) -> list[tuple[View, bool, Aspect]]:
+    """View, whether in motion, and changes of whatever is asked for from now on."""
+    asked: list[tuple[View, bool, Aspect]] = []
+    request = driver.feed._scheduler.request
+    driver.feed._scheduler.request = lambda frame, changes: (
+        asked.append((frame.view, frame.moving, changes.aspects)),
+        request(frame, changes),
+    )[1]
+    return asked
+
+
+@pytest.mark.parametrize(
+    "edit",
+    [
+        SetMaterial("red", {"roughness": 0.7}),
+        SetFields("lamp", {"intensity": 3.0}),
+        Move({"lamp": Transform((0.0, 2.0, 0.0))}),
+    ],
+    ids=["material", "gain", "lamp"],
+)
+def test_dragging_a_material_or_a_light_keeps_what_is_seen_at_rest(driver: Driver, edit: Edit) -> None:
+    driver.document.apply(Add((PointLamp(id="lamp", name="Lamp"),)))
+    driver.settle()
+    driver.feed.restart()  # whatever the new lamp made of the window's layout
+    driver.settle()
+    rest = driver.fake.frames[-1].view
+    assert (rest.antialias, rest.fine_edges) == (2, True)
+    asked = asked_for(driver)
+    driver.feed.hold()
+    driver.document.apply(edit)
+    driver.until(lambda: driver.feed.last.moving and not driver.feed.busy)
+    ((view, moving, aspects),) = asked
+    assert (view, moving) == (rest, True)
+    assert not aspects & Aspect.VIEW, "primary rays are kept"
+    driver.feed.release()
+    driver.settle()
+    assert not asked[-1][1]
+    assert asked[-1][2] & Aspect.VIEW
+
+
+def test_a_material_changed_while_looking_around_has_the_pixels_of_motion(driver: Driver) -> None:
+    driver.feed.hold()
+    shift(driver, 1.4)
+    driver.until(lambda: driver.feed.last.moving and not driver.feed.busy)
+    asked = asked_for(driver)
+    rough(driver, 0.9)
+    driver.until(lambda: bool(asked) and not driver.feed.busy)
+    (view, _, aspects) = asked[0]
+    assert view.width < driver.feed.size[0]
+    assert not aspects & Aspect.VIEW
+    driver.feed.release()
+    driver.settle()
+
+
+def test_material_pictures_that_come_slowly_lose_pixels(driver: Driver) -> None:
+    for _ in range(ALIKE):
+        driver.feed.pace.took(2 * KEPT, kept=True)
+    asked = asked_for(driver)
+    driver.feed.hold()
+    rough(driver, 0.7)
+    driver.until(lambda: driver.feed.last.moving and not driver.feed.busy)
+    assert asked[0][0].width < driver.feed.size[0]
+    driver.feed.release()
+    driver.settle()
+    assert driver.feed.pace.keeps, "the next motion tries again"
 
 
 def test_while_dragging_quick_pictures_grow(driver: Driver) -> None:

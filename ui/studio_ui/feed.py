@@ -2,7 +2,8 @@
 
 While somebody drags or looks around, pictures are unsmoothed, as small as they must be to come quickly, and
 each is asked for as soon as the last was seen; at rest one full, smoothed picture follows. Single moves
-and undo are shown like that too before they are exact. No Qt here.
+and undo are shown like that too before they are exact. Where only light and materials change, what is seen
+at rest stays, and no ray is traced for it again. No Qt here.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from typing import Any, Protocol
 
 from studio_core.document import Document
 from studio_core.scene.diff import Aspect, Changes, everything, view_changed
-from studio_core.scene.nodes import Scene
+from studio_core.scene.nodes import Light, Scene
 from studio_core.session import Session, View
 from studio_core.shading.artifacts import MeasuredError, Picture
 from studio_core.shading.frame import Frame
@@ -28,6 +29,8 @@ from studio_ui.pace import Pace
 
 _SLOW = Aspect.TRANSFORM | Aspect.STRUCTURE
 """What takes long to be exact: also a single step of it, such as undo, is first seen quickly."""
+_LOOKS = Aspect.MATERIAL | Aspect.LIGHT | Aspect.GAIN | Aspect.NAME
+"""What leaves every surface where it is."""
 REST_MS = 260
 REST_PIXELS, REST_SAMPLES = 2_400_000, 4_500_000
 
@@ -231,7 +234,7 @@ class PictureFeed:
         shrink = min(1.0, (limit / (width * height)) ** 0.5)
         view = self._session.view.sized(round(width * shrink), round(height * shrink))
         smooth = not moving and view.width * view.height * 4 <= REST_SAMPLES
-        return dataclasses.replace(view, antialias=2 if smooth else 1)
+        return dataclasses.replace(view, antialias=2 if smooth else 1, fine_edges=not moving)
 
     def close(self) -> None:
         """Stop listening, cancel, show nothing more."""
@@ -287,6 +290,8 @@ class PictureFeed:
         self._answered = False
         self._glance, self._hurried = False, moving
         quick = moving or self.last is None
+        if quick and self._keeps(changes):
+            quick = False
         view = self.frame_view(quick)
         if view != self._asked_view:  # other pixels concern stages as another eye does
             changes, self._asked_view = changes | view_changed(), view
@@ -296,6 +301,14 @@ class PictureFeed:
         self._asked[revision] = asked
         self._outdated = self._outdated if finer_only else revision
         self._scheduler.request(frame, changes)
+
+    def _keeps(self, changes: Changes) -> bool:
+        """Whether a moving picture has the pixels and samples of rest, which were traced already."""
+        scene = self._document.scene
+        lamps = all(isinstance(scene.nodes.get(node), Light) for node in changes.of(Aspect.TRANSFORM))
+        still = not changes.aspects & ~(_LOOKS | (Aspect.TRANSFORM if lamps else Aspect.NONE))
+        traced = self.last is not None and self._asked_view == self.frame_view(False)
+        return still and traced and self.pace.keeps
 
     def _rest(self) -> None:
         if self._closed or self.moving:
@@ -310,11 +323,8 @@ class PictureFeed:
     def _coarse(self, shown: Shown | Frame) -> bool:
         """Whether a picture at rest is more exact, or has other pixels or samples."""
         rest, view = self.frame_view(False), shown.view
-        return shown.moving or (view.width, view.height, view.antialias) != (
-            rest.width,
-            rest.height,
-            rest.antialias,
-        )
+        asked = (rest.width, rest.height, rest.antialias, rest.fine_edges)
+        return shown.moving or (view.width, view.height, view.antialias, view.fine_edges) != asked
 
     def _show(self, frame: Frame, picture: Picture, final: bool) -> None:
         self._answered = True
@@ -322,7 +332,7 @@ class PictureFeed:
         self._asked = {r: t for r, t in self._asked.items() if r >= frame.revision}
         self.last = Shown(picture, frame.view, final, self._clock() - asked, frame.moving)
         if frame.moving and final:
-            self.pace.took(self.last.seconds)
+            self.pace.took(self.last.seconds, kept=frame.view.fine_edges)
         elif not frame.moving:
             self.pace.rest()
         self.shown.emit(self.last)

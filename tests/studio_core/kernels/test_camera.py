@@ -11,6 +11,7 @@ from studio_core.kernels.camera import (
     TILE_HEIGHT,
     TILE_WIDTH,
     first_hits,
+    pixels_of,
     sample_at,
     sample_directions,
     tiles_across,
@@ -88,7 +89,7 @@ def test_first_hits_are_those_of_each_sample_s_own_ray(caster, workers, size, so
     handles, offsets = caster.handles(), np.array([0, 20, 30])
     first_hits(
         handles.intersect8, handles.scene, caster.local(eye), lens, handles.face_start, handles.face_ids,
-        offsets, chosen, face, u, v, distance, 0, len(chosen) if some else len(tiles),
+        offsets, chosen, face, u, v, distance, False, 0, len(chosen) if some else len(tiles),
     )  # fmt: skip
     x, y = np.array([place_of(s, width, n) for s in range(count)]).T
     traced = np.isin((y // TILE_HEIGHT) * tiles_across(lens) + x // TILE_WIDTH, chosen) | (not some)
@@ -104,3 +105,33 @@ def test_first_hits_are_those_of_each_sample_s_own_ray(caster, workers, size, so
     np.testing.assert_allclose(u[hit], found.u[hit], atol=1e-4)
     np.testing.assert_allclose(v[hit], found.v[hit], atol=1e-4)
     assert np.isinf(distance[traced & (face < 0)]).all()
+
+
+@given(SIZES, st.lists(st.integers(0, 60), unique=True))
+def test_pixels_of_tiles_are_those_with_a_sample_in_one(size, tiles):
+    width, height, n = size
+    lens = lens_of(size)
+    tiles = [tile for tile in tiles if tile < tiles_across(lens) * tiles_down(lens)]
+    x, y = np.array([place_of(s, width, n) for s in range(width * height * n * n)]).T
+    inside = np.isin((y // TILE_HEIGHT) * tiles_across(lens) + x // TILE_WIDTH, tiles)
+    found = pixels_of(lens, np.array(tiles, np.int64))
+    np.testing.assert_array_equal(found, np.flatnonzero(inside.reshape(-1, n * n).any(axis=1)))
+
+
+@given(st.lists(st.integers(0, 34), unique=True, min_size=1))
+def test_compact_hits_are_those_in_their_places(caster, pixels):
+    eye, lens = np.array([0.3, 1.0, 4.0]), lens_of((7, 5, 4))
+    handles, offsets = caster.handles(), np.array([0, 20, 30])
+
+    def trace(tiles, count, compact):
+        face, parts = np.full(count, -7, np.int32), np.full((3, count), -7, np.float32)
+        first_hits(
+            handles.intersect8, handles.scene, caster.local(eye), lens, handles.face_start,
+            handles.face_ids, offsets, tiles, face, *parts, compact, 0, len(tiles),
+        )  # fmt: skip
+        return np.vstack([face, parts])
+
+    whole = trace(np.arange(tiles_across(lens) * tiles_down(lens)), 35 * 16, False)
+    tiles = np.array([(2 * (p // 7) + half) * 7 + p % 7 for p in pixels for half in (0, 1)])
+    some = trace(tiles, 16 * len(pixels), True)
+    np.testing.assert_array_equal(some.reshape(4, -1, 16), whole.reshape(4, -1, 16)[:, pixels])

@@ -29,10 +29,10 @@ def services(host, workers):
     return Services(workers, host)
 
 
-def measured(scene, services, host, *, places=300, **values):
+def measured(scene, services, host, *, places=300, fine=False, **values):
     backend = host.get("backend", "reference")
     pipeline = Pipeline([*backend.stages(services), PictureStage(services)])
-    view = dataclasses.replace(scene_view(scene, None, 64, 36), antialias=1)
+    view = dataclasses.replace(scene_view(scene, None, 64, 36), antialias=1, fine_edges=fine)
     params = backend_params(backend, {"directions": "32768", "vertices": 1800, **values})
     frame = Frame(scene, view, params, 1)
     made = pipeline.update(frame, Changes(), Job("shade"))
@@ -103,6 +103,14 @@ def test_the_estimate_meets_the_error_of_all_pixels(services, host, little_scene
     assert isinstance(made, Picture)
     assert every.picture.places == int((made.node >= 0).sum())
     assert abs(some.picture.relative_rmse - every.picture.relative_rmse) < 4 * some.picture.uncertainty + 1e-4
+
+
+def test_finer_edges_leave_what_is_measured(services, host, little_scene):
+    plain, _, _, _ = measured(little_scene(), services, host)
+    fine, made, pipeline, _ = measured(little_scene(), services, host, fine=True)
+    assert len(pipeline.artifact(Hits).edges.pixels) > 50
+    assert fine.picture == plain.picture
+    assert np.isfinite(made.linear).all()
 
 
 def test_every_light_layer_has_its_error(services, host, little_scene):

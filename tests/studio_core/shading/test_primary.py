@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from oracles import edges as oracle
 from scenes import little_scene as make_little_scene
 
 from studio_core import edits
@@ -37,11 +38,11 @@ def unit(quaternion):
 class Looking:
     """The first stages by hand, each with what it gave before."""
 
-    def __init__(self, scene, host, workers, *, width=90, height=61, antialias=1):
+    def __init__(self, scene, host, workers, *, width=90, height=61, antialias=1, fine=False):
         self.services = Services(workers, host)
         self.surface, self.caster, self.primary = SurfaceStage(), CasterStage(), PrimaryStage(self.services)
         self.view = View.of(next(scene.of(Camera)), scene, width, height)
-        self.view = dataclasses.replace(self.view, antialias=antialias)
+        self.view = dataclasses.replace(self.view, antialias=antialias, fine_edges=fine)
         self.surfaces = self.casters = self.hits = None
         self.see(scene)
 
@@ -59,14 +60,17 @@ class Looking:
 
 
 def layers(hits):
-    """(index or None, hits) of every layer."""
+    """(index or None, hits) of every layer, also of pixels in which something ends."""
     made = [(None, hits)]
+    if hits.edges is not None:
+        made.append((hits.edges.pixels, hits.edges.hits))
     for _, layer in made:
         made.extend(layer.behind)
     return made
 
 
 def assert_same(hits, others):
+    assert (hits.edges is None) == (others.edges is None)
     ours, theirs = layers(hits), layers(others)
     assert len(ours) == len(theirs)
     for (index, a), (other, b) in zip(ours, theirs, strict=True):
@@ -87,7 +91,9 @@ def glazed(scene, opacity=0.4):
 def test_kept_hits_are_those_of_tracing_all_again(host, workers, data, see_through):
     scene = make_little_scene()
     scene = glazed(scene) if see_through else scene
-    looking_ = Looking(scene, host, workers, antialias=data.draw(st.integers(1, 2)))
+    looking_ = Looking(
+        scene, host, workers, antialias=data.draw(st.integers(1, 2)), fine=data.draw(st.booleans())
+    )
     objects = [node.id for node in scene.of(MeshObject)]
     for _ in range(4):
         moves = {}
@@ -187,9 +193,10 @@ def test_a_screen_box_holds_every_point_of_the_box(low, size, shift, turn, margi
 
 
 @pytest.mark.parametrize("see_through", [False, True])
-def test_visible_vertices_are_the_corners_of_seen_sides(host, workers, little_scene, see_through):
+@pytest.mark.parametrize("fine", [False, True])
+def test_visible_vertices_are_the_corners_of_seen_sides(host, workers, little_scene, see_through, fine):
     scene = glazed(little_scene()) if see_through else little_scene()
-    eye = Looking(scene, host, workers)
+    eye = Looking(scene, host, workers, fine=fine)
     mesh = eye.surfaces.mesh
     place = np.asarray(eye.view.transform.translation) - mesh.origin
     expected = set()
@@ -204,5 +211,82 @@ def test_visible_vertices_are_the_corners_of_seen_sides(host, workers, little_sc
 
 def test_the_number_of_threads_changes_nothing(host, little_scene, workers):
     with Workers(1) as alone:
-        one = Looking(glazed(little_scene()), host, alone, antialias=2)
-    assert_same(one.hits, Looking(glazed(little_scene()), host, workers, antialias=2).hits)
+        one = Looking(glazed(little_scene()), host, alone, antialias=2, fine=True)
+    assert_same(one.hits, Looking(glazed(little_scene()), host, workers, antialias=2, fine=True).hits)
+
+
+@pytest.mark.parametrize("see_through", [False, True])
+@pytest.mark.parametrize("antialias", [1, 2, 3])
+def test_pixels_in_which_something_ends_have_the_hits_of_sixteen_samples(
+    host, workers, little_scene, see_through, antialias
+):
+    scene = glazed(little_scene()) if see_through else little_scene()
+    eye = Looking(scene, host, workers, antialias=antialias, fine=True)
+    plain = Looking(scene, host, workers, antialias=antialias).hits
+    whole = Looking(scene, host, workers, antialias=4, fine=True).hits
+    assert whole.edges is None, "there are as many everywhere"
+    pixels = eye.hits.edges.pixels
+    assert 0 < len(pixels) < 0.4 * 90 * 61
+    assert_same(dataclasses.replace(eye.hits, edges=None), plain)
+    ours, theirs, own = eye.hits.edges.hits, whole, np.arange(16 * len(pixels))
+    at = eye.hits.edges.of_picture(own)
+    np.testing.assert_array_equal(at, (pixels[:, None] * 16 + np.arange(16)).ravel())
+    while True:
+        for name in ARRAYS:
+            np.testing.assert_array_equal(getattr(ours, name), getattr(theirs, name)[at])
+        assert bool(ours.behind) == bool(np.isin(at, [i for index, _ in theirs.behind for i in index]).any())
+        if not ours.behind:
+            break
+        ((index, ours),), ((all_, theirs),) = ours.behind, theirs.behind
+        order = np.argsort(at[index], kind="stable")
+        np.testing.assert_array_equal(np.sort(at[index]), at[index][order])
+        at = np.searchsorted(all_, at[index])
+    assert eye.hits.traced == plain.traced + eye.hits.edges.hits.traced
+    if not see_through:
+        assert eye.hits.edges.hits.traced == 16 * len(pixels)
+
+
+@pytest.mark.parametrize("see_through", [False, True])
+def test_edge_pixels_are_those_of_the_oracle(host, workers, little_scene, see_through):
+    scene = glazed(little_scene()) if see_through else little_scene()
+    eye = Looking(scene, host, workers, width=40, height=31, antialias=2, fine=True)
+    hits, mesh = eye.hits, eye.surfaces.mesh
+    expected, unsure = np.zeros((2, 40 * 31), np.bool_)
+    seen = [getattr(hits, name).copy() for name in ARRAYS]
+    at, rests = np.arange(len(hits.face)), hits.behind
+    while True:
+        found, doubt = oracle.edge_pixels(mesh, *seen, 40, 2)
+        expected, unsure = expected | found, unsure | doubt
+        if not rests:
+            break
+        ((index, rest),) = rests
+        at, rests = at[index], rest.behind
+        for array, name in zip(seen, ARRAYS, strict=True):
+            array[at] = getattr(rest, name)
+    made = np.zeros(40 * 31, np.bool_)
+    made[hits.edges.pixels] = True
+    assert unsure.mean() < 0.02
+    np.testing.assert_array_equal(made[~unsure], expected[~unsure])
+
+
+def test_a_small_move_traces_edges_again_only_where_it_was_seen(host, workers, little_scene):
+    scene = little_scene()
+    eye = Looking(scene, host, workers, width=160, height=120, antialias=2, fine=True)
+    cube = scene["cube"].transform
+    higher = dataclasses.replace(cube, translation=tuple(np.add(cube.translation, (0, 0.01, 0))))
+    eye.see(edits.Move({"cube": higher})(scene))
+    again, anew = eye.hits.edges.hits, eye.anew.edges.hits
+    assert 0 < again.traced < anew.traced == 16 * len(eye.hits.edges.pixels)
+    assert_same(eye.hits, eye.anew)
+
+
+def test_another_border_between_materials_is_another_edge(host, workers):
+    scene = make_little_scene()
+    top = scene["floor"]
+    halves = dataclasses.replace(top.geometry, slots=np.array([0, 1], np.uint16))
+    scene = scene.with_nodes(dataclasses.replace(top, geometry=halves, materials=("matt", "matt")))
+    eye = Looking(scene, host, workers, fine=True)
+    alike = eye.hits
+    eye.see(scene.with_nodes(dataclasses.replace(scene["floor"], materials=("matt", "paint"))))
+    assert len(eye.hits.edges.pixels) > len(alike.edges.pixels)
+    assert_same(eye.hits, eye.anew)

@@ -239,11 +239,39 @@ def test_hits_carried_down_are_hits_traced(refined) -> None:
     compare(hits, traced)
 
 
+def test_hits_of_pixels_in_which_something_ends_are_carried_down_too(refined) -> None:
+    refined.document.apply(edits.SetMaterial("paint", opacity=0.4))
+    refined.view = dataclasses.replace(refined.view, fine_edges=True)
+    refined.look()
+    surfaces, carried = refined.surfaces, refined.pipeline.artifact(Hits)
+    frame = Frame(refined.document.scene, refined.view, refined.params)
+    made = {Surfaces: surfaces.unrefined, Casters: refined.pipeline.artifact(Casters)}
+    traced = PrimaryStage(refined.services).run(frame, Inputs(made, Changes()), Job("trace"))
+    np.testing.assert_array_equal(carried.edges.pixels, traced.edges.pixels)
+
+    def points(mesh, hits: Hits):
+        hit = hits.face >= 0
+        weights = np.stack([1 - hits.u - hits.v, hits.u, hits.v], axis=1)[hit]
+        return np.einsum("nk,nkc->nc", weights, mesh.positions[mesh.faces[hits.face[hit]]])
+
+    pairs = [(carried.edges.hits, traced.edges.hits)]
+    for below, above in pairs:
+        np.testing.assert_array_equal(below.face >= 0, above.face >= 0)
+        ours, theirs = points(surfaces.mesh, below), points(surfaces.unrefined.mesh, above)
+        np.testing.assert_allclose(ours, theirs, atol=1e-5)
+        for (a, rest), (b, other) in zip(below.behind, above.behind, strict=True):
+            np.testing.assert_array_equal(a, b)
+            pairs.append((rest, other))
+    assert len(pairs) > 1
+    assert (carried.edges.hits.face != traced.edges.hits.face).any()
+
+
 def test_one_thread_refines_like_two(services, little_scene) -> None:
     scene = little_scene(environment=window())
     with Workers(1) as one:
         single = Refined(scene, Services(one, services.registry))
         double = Refined(scene, services)
+        single.view = double.view = dataclasses.replace(double.view, fine_edges=True)
         np.testing.assert_array_equal(single.look().linear, double.look().linear)
         np.testing.assert_array_equal(single.surfaces.mesh.faces, double.surfaces.mesh.faces)
 
