@@ -81,8 +81,8 @@ def work(program: Headless) -> None:
         first.append(frame)
 
     scene = load(sample()).scene
-    view = scene_view(scene, None, 160, 90)
-    moving = dataclasses.replace(view, antialias=1)
+    view = dataclasses.replace(scene_view(scene, None, 160, 90), fine_edges=True)
+    moving = dataclasses.replace(view, antialias=1, fine_edges=False)
     sky = next(scene.of(Environment))
     turned = scene.with_nodes(dataclasses.replace(sky, azimuth=sky.azimuth + 20))
     step = Transform((0.1, 0.0, 0.05))
@@ -93,7 +93,7 @@ def work(program: Headless) -> None:
         show(at, moving, True)
     show(turned, view, False)
     show(moved[0], view, False)
-    show(scene, dataclasses.replace(aside, antialias=1), True)
+    show(scene, dataclasses.replace(aside, antialias=1, fine_edges=False), True)
     show(scene, aside, False)
     ErrorMeter(services)(pipeline, first[-1], Job("measuring ahead"))
     pipeline.complete(first[-1], Job("completing ahead"))
