@@ -53,6 +53,42 @@ def fill(
 
 
 @kernel
+def lean_on(between: I64, summed: Bools, needed: Bools) -> None:
+    """Marks also those between which the needed vertices lie, down to the summed ones."""
+    for i in range(len(between) - 1, -1, -1):
+        if needed[i] and not summed[i]:
+            needed[between[i, 0]] = True
+            needed[between[i, 1]] = True
+
+
+@kernel
+def lift(
+    between: I64, summed: Bools, wanted: Bools, settled: Bools, standing: F32, known: Bools, irradiance: F32
+) -> Bools:
+    """Irradiance (V, 3) of wanted vertices that are not settled, where it can be told; (V,) where it was.
+
+    `standing` (V, 3), where `known`, is that past all that stands still. What moves takes as much of
+    it from a vertex as from the two it lies `between`: fine shadows of what stands still stay as they are.
+    """
+    half = np.float32(0.5)
+    lifted = np.zeros(len(between), np.bool_)
+    for i in range(len(between)):
+        one, other = between[i, 0], between[i, 1]
+        if summed[i] or settled[i] or not wanted[i] or one == other:
+            continue
+        sure = known[i] and known[one] and known[other]
+        if not (sure and (summed[one] or settled[one] or lifted[one])):
+            continue
+        if not (summed[other] or settled[other] or lifted[other]):
+            continue
+        for c in range(3):
+            moved = irradiance[one, c] - standing[one, c] + irradiance[other, c] - standing[other, c]
+            irradiance[i, c] = max(standing[i, c] + half * moved, np.float32(0))
+        lifted[i] = True
+    return lifted
+
+
+@kernel
 def _usual(material: I32, summed: Bools, terms: F32, irradiance: F32, light: F64, usual: F64) -> None:
     """Terms over irradiance of all summed vertices together, by material."""
     for i in range(len(summed)):
@@ -81,10 +117,7 @@ def _fill(
     level: F32,
 ) -> None:
     half = np.float32(0.5)
-    for i in range(len(between) - 1, -1, -1):
-        if needed[i] and not summed[i]:
-            needed[between[i, 0]] = True
-            needed[between[i, 1]] = True
+    lean_on(between, summed, needed)
     for i in range(len(between)):
         if summed[i]:
             for c in range(3):

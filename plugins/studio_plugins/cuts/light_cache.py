@@ -22,6 +22,7 @@ Bools = npt.NDArray[np.bool_]
 
 CHUNK = 128
 MOVING = 8.0  # times as much is allowed of a node while a hand turns the light, or of what coarse records see
+AT_ONCE = 4096  # vertices of which what stands still is summed in one picture
 _FLOOR = 0.02  # of the irradiance of an open place: darker ones need no finer nodes
 _ROOM, _RUNS = 384, 1024  # nodes and run ends a point that room is made for at first
 
@@ -47,6 +48,9 @@ class LightCache:
         self._glossy = np.zeros(0, np.bool_)
         self.runs = Records(15, 0)
         self._run_stamp = np.zeros(0, np.int64)
+        self._standing = np.zeros((0, 3), np.float32)
+        self._standing_stamp = np.zeros(0, np.int64)
+        self._standing_state: tuple[object, ...] = ()
 
     @property
     def prefix(self) -> Prefix | None:
@@ -116,6 +120,71 @@ class LightCache:
         if len(rest):
             self._sum(sources, mesh, rest, glossy, False, job)
         return len(changed)
+
+    def standing(
+        self, store: VisibilityStore, mesh: WorldMesh, wanted: Bools, job: Job
+    ) -> tuple[npt.NDArray[np.float32], Bools]:
+        """Irradiance (V, 3) of the wanted vertices past what is not out of date, and where it is known.
+
+        Only so many are summed at once: whoever begins to drag something should not wait for it.
+        """
+        points = np.flatnonzero(wanted & (store.exact.stamp > 0))
+        sources = store.standing()
+        state = (store, store.generation, self._tree, sources.skip.tobytes())
+        if state != self._standing_state or len(self._standing) != len(store.exact):
+            self._standing = np.zeros((len(store.exact), 3), np.float32)
+            self._standing_stamp = np.zeros(len(store.exact), np.int64)
+            self._standing_state = state
+        fresh = points[self._standing_stamp[points] != store.exact.stamp[points]][:AT_ONCE]
+        if len(fresh) and self._prefix is not None:
+            self._irradiance(sources, mesh, fresh, self._standing, job)
+            self._standing_stamp[fresh] = store.exact.stamp[fresh]
+        return self._standing, (self._standing_stamp > 0) & (self._standing_stamp == store.exact.stamp)
+
+    def _irradiance(
+        self, sources: Sources, mesh: WorldMesh, points: I64, out: npt.NDArray[np.float32], job: Job
+    ) -> None:
+        """Nothing but the irradiance of the points."""
+        prefix = self._prefix
+        assert prefix is not None
+        count = len(sources.start)
+        unknown, flat = np.full(count, -1, np.int32), np.zeros(count, np.bool_)
+
+        def body(begin: int, stop: int) -> None:
+            while begin < stop:
+                nodes = np.empty(FLOATS * (MOST_NODES + stop - begin), np.float32)
+                runs = np.empty((2 << self.runs.k) + _RUNS * (stop - begin), self.runs.pool.dtype)
+                begin += gather_light(
+                    begin,
+                    stop,
+                    points,
+                    mesh.normals,
+                    sources.owner,
+                    flat,
+                    sources.pool,
+                    sources.start,
+                    sources.length,
+                    sources.coarse_pool,
+                    sources.coarse_start,
+                    sources.coarse_length,
+                    sources.row,
+                    sources.skip,
+                    prefix.block,
+                    prefix.leaf,
+                    0.0,
+                    0.0,
+                    out,
+                    nodes,
+                    np.empty(len(points), np.int64),
+                    np.empty(2 * (stop - begin), np.float32),
+                    self.runs.pool,
+                    self.runs.start,
+                    unknown,
+                    runs,
+                    np.empty(len(points), np.int64),
+                )
+
+        self._workers.run(len(points), CHUNK, body, job)
 
     def _sum(
         self,

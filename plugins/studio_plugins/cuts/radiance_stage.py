@@ -14,7 +14,7 @@ from studio_core.shading.artifacts import TERMS, Hits, LayerRadiance, Radiance, 
 from studio_core.shading.frame import Frame
 from studio_core.shading.job import Job
 from studio_core.shading.pipeline import Inputs
-from studio_plugins.cuts.fill import fill
+from studio_plugins.cuts.fill import fill, lift
 from studio_plugins.cuts.focus_stage import Focused
 from studio_plugins.cuts.nodes import NodeTable
 from studio_plugins.cuts.stages import Arriving, Seen
@@ -104,6 +104,9 @@ class RadianceStage:
                 settled = arriving.settled.get(node, np.zeros(count, np.bool_))
                 rows = np.flatnonzero(rest & settled)
                 irradiance[rows] = _irradiance(pairs, rows)
+                if node in arriving.standing:
+                    past, known = arriving.standing[node]
+                    settled = settled | lift(seen.between, summed, rest, settled, past, known, irradiance)
                 fill(seen.between, mesh.material, summed, rest, settled, terms, irradiance)
                 done = [np.where(rest, -1, version) for version in done]
             layers[node] = LayerRadiance(terms, irradiance)

@@ -35,6 +35,7 @@ from studio_core.shading.pipeline import Inputs
 from studio_core.shading.primary import visible_vertices
 from studio_plugins.cuts import keeping
 from studio_plugins.cuts.choose import Prefix
+from studio_plugins.cuts.fill import lean_on
 from studio_plugins.cuts.forecast import Forecast
 from studio_plugins.cuts.glimpse import Glow
 from studio_plugins.cuts.lamps import LampCache, Source, lamp_source, sphere
@@ -235,7 +236,8 @@ class Arriving:
     """The light of every layer at the vertices: tables of nodes, which change in place.
 
     `environment` is the table of what exact records see, made from `prefix` sums over `runs`; `settled` tells
-    of each layer at which vertices (V,) its irradiance is that of now, also where it was not asked for.
+    of each layer at which vertices (V,) its irradiance is that of now, also where it was not asked for;
+    `standing` what it is past all that stands still (V, 3), and where that is known.
     """
 
     layers: tuple[tuple[NodeId, tuple[NodeTable, ...]], ...]
@@ -244,6 +246,7 @@ class Arriving:
     prefix: Prefix | None
     runs: Records
     settled: Mapping[NodeId, Bools]
+    standing: Mapping[NodeId, tuple[F32, Bools]]
     summed: int
     lamp_points: int
 
@@ -309,7 +312,8 @@ class LightStage:
         layers = tuple(self._tables(lighting, exact))
         newest = tuple(table.newest for _, tables in layers for table in tables)
         previous: Arriving | None = inputs.previous
-        if previous is not None and previous.newest == newest and _same(previous.layers, layers):
+        same = previous is not None and previous.newest == newest and _same(previous.layers, layers)
+        if same and previous is not None and not previous.standing:  # of which there may be more by now
             return previous
         there = lighting.environment is not None and exact
         environment = self._environment.table if there else None
@@ -318,7 +322,16 @@ class LightStage:
             node, own = lighting.environment.id, self._environment.settled(seen.store)
             settled[node] = own & settled[node] if node in settled else own
         kept = self._environment
-        return Arriving(layers, newest, environment, kept.prefix, kept.runs, settled, summed, looked)
+        standing: dict[NodeId, tuple[F32, Bools]] = {}
+        if lighting.environment is not None and exact and seen.between is not None:
+            node = lighting.environment.id
+            needed = seen.mask & ~settled[node] & ~seen.summed
+            lean_on(seen.between, seen.summed, needed)
+            if needed.any():
+                standing[node] = kept.standing(seen.store, mesh, needed, job)
+        return Arriving(
+            layers, newest, environment, kept.prefix, kept.runs, settled, standing, summed, looked
+        )
 
     def _fitted(self, tree: LightTree, k: int) -> LightTree:
         """The tree over 2^k leaves; of a coarser one every leaf is repeated."""

@@ -222,6 +222,19 @@ class VisibilityStore:
             self.exact.stamp,
         )
 
+    def standing(self) -> Sources:
+        """What vertices see past everything that is not out of date: nothing else hides anything."""
+        row, table = self._stale(np.arange(len(self.exact)))
+        skip = np.empty((len(table), len(self._slots), len(self._alive)), np.bool_)
+        skip[:] = ~self._alive
+        skip[:, :, self._slots] |= table
+        nothing = np.zeros(len(self.exact), np.int32)
+        start, stamp = self.exact.start, self.exact.stamp
+        exact = self.exact.pool, start, self.exact.length
+        return Sources(
+            *exact, self.exact.pool, start, nothing, row.astype(np.int32), self._owner, skip, stamp, stamp
+        )
+
     @property
     def full(self) -> bool:
         """Whether slots, which are never used again, will soon have no number left in a record."""

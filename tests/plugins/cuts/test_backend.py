@@ -27,7 +27,7 @@ from studio_core.shading.job import Job
 from studio_core.shading.materials import coefficients, resolve
 from studio_core.shading.offline import backend_params, scene_view, shade
 from studio_core.shading.pipeline import Pipeline
-from studio_plugins.cuts import stages
+from studio_plugins.cuts import light_cache, stages
 from studio_plugins.cuts.stages import Seen
 
 FAST = {"directions": "1024", "vertices": 700, "refine": False, "lamp_samples": 8}
@@ -673,3 +673,20 @@ def test_what_takes_no_time_is_shown_exact_at_once(room, monkeypatch):
     final = room.do(MOVE, job)
     assert [made.final for made in published] == [True]
     assert published[0] is final
+
+
+def test_fine_shadows_of_what_stands_still_stay_during_a_drag(host, services, monkeypatch):
+    """Irradiance past what stands still is summed a few vertices a picture, and brings refinement back."""
+    monkeypatch.setattr(light_cache, "AT_ONCE", 40)
+    room = Bench(lit_scene(), host, services, refine=True, vertices=700)
+    room.update(Changes())
+    parts = [room.do(MOVE, moving=True)]
+    parts += [room.update(view_changed(), moving=True) for _ in range(8)]
+    past, known = room.pipeline.artifact(stages.Arriving).standing["sky"]
+    assert known.sum() > 80
+    published, job = listening()
+    room.update(view_changed(), job)
+    exact = next(made for made in published if made.final)
+    errors = [wrong(room, part, exact) for part in (parts[0], parts[-1])]
+    assert errors[1] < errors[0]
+    assert (past[known] >= 0).all()

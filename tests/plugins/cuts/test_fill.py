@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from oracles import cuts as oracle
 
-from studio_plugins.cuts.fill import USUAL, fill
+from studio_plugins.cuts.fill import USUAL, fill, lift
 
 
 def made(rng, count, base):
@@ -115,3 +115,41 @@ def test_what_nobody_sees_is_passed_through_and_keeps_what_it_has():
         np.testing.assert_allclose(terms[4], 1.5)
         assert np.isnan(terms[3]).all()
         assert np.isnan(irradiance[3]).all()
+
+
+@given(st.integers(0, 2**32 - 1))
+@settings(max_examples=30)
+def test_what_moves_takes_as_much_as_from_the_neighbours(seed):
+    rng = np.random.default_rng(seed)
+    count, base = 60, 20
+    between = made(rng, count, base)
+    summed, wanted = np.arange(count) < base, np.arange(count) >= base
+    settled, known = rng.random(count) < 0.2, rng.random(count) < 0.9
+    standing = rng.uniform(0, 3, (count, 3)).astype(np.float32)
+    now = (standing * rng.uniform(0, 1, (count, 1))).astype(np.float32)
+    irradiance = now.copy()
+    lifted = lift(between, summed, wanted, settled, standing, known, irradiance)
+    has = summed | (settled & wanted)
+    expected = now.astype(np.float64)
+    for i in range(base, count):
+        a, b = between[i]
+        sure = known[[i, a, b]].all() and has[a] and has[b] and not settled[i]
+        assert lifted[i] == sure
+        if sure:
+            taken = (standing[a] - expected[a] + standing[b] - expected[b]) / 2
+            expected[i] = np.maximum(standing[i] - taken, 0)
+            has[i] = True
+    np.testing.assert_allclose(irradiance, expected, atol=1e-5)
+    assert not lifted[:base].any()
+
+
+def test_fine_shadows_of_what_stands_still_stay():
+    """Nothing moved takes any light: refined vertices have what they had."""
+    rng = np.random.default_rng(5)
+    between = made(rng, 60, 20)
+    summed, wanted = np.arange(60) < 20, np.arange(60) >= 20
+    standing = rng.uniform(0, 3, (60, 3)).astype(np.float32)
+    irradiance = np.where(summed[:, None], standing, np.float32(0))
+    nobody, everybody = np.zeros(60, np.bool_), np.ones(60, np.bool_)
+    assert lift(between, summed, wanted, nobody, standing, everybody, irradiance)[20:].all()
+    np.testing.assert_allclose(irradiance, standing, rtol=1e-6)

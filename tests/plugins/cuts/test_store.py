@@ -449,3 +449,17 @@ def test_every_record_is_well_formed(bench, kit):
             flat = [leaf for pair in pairs for leaf in pair]
             assert flat == sorted(flat)
             assert all(b - a > 1 for a, b in zip(flat[1::2], flat[2::2], strict=False))
+
+
+def test_past_what_is_out_of_date_everything_else_is_seen(bench, kit, workers, job):
+    moved = kit.room.placed(**MOVES[0])
+    bench.follow(moved)
+    sources = bench.store.standing()
+    without = Bench(kit.room.without("box"), workers, job).traced()
+    expected = kit.seen_by(without.store)
+    others = np.flatnonzero(moved.mesh.object != 1)
+    for p, free in zip(others, expected, strict=True):
+        record = sources.pool[sources.start[p] : sources.start[p] + sources.length[p]]
+        skip = np.flatnonzero(sources.skip[sources.row[p], sources.owner[p]])
+        np.testing.assert_array_equal(oracle.seen(record, 1 << K, skip), free)
+    assert not sources.coarse_length.any()
