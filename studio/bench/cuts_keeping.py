@@ -2,9 +2,9 @@
 
 `settle`: an object was dragged and stands where it began; how long until the refined picture is final, and
 how wrong that is: matte materials that Mitsuba has, `settle-glossy` with its metal, `settle-own` the room as
-it is, where only our own brute force can tell, `settle-truer…` with the control further to truer and sixteen
-samples a pixel. `precompute`: everything with an empty cache folder, and with
-a full one. `memory`: visibility as it is held, `memory-working`: what one view's shading takes on top.
+it is, where only our own brute force can tell, `settle-truer…` with the control further to truer.
+`precompute`: everything with an empty cache folder, and with a full one. `memory`: visibility as it is held,
+`memory-working`: what one view's shading takes on top.
 """
 
 from __future__ import annotations
@@ -33,10 +33,9 @@ DRAGGED = 4
 
 @dataclass(frozen=True)
 class Settle:
-    """Materials, samples a pixel along each side, and the quality control (None: as it comes)."""
+    """Materials, and the quality control (None: as it comes)."""
 
     materials: str
-    antialias: int = 2
     quality: float | None = None
 
 
@@ -44,8 +43,8 @@ SETTLES = {
     "settle": Settle(NATIVE["diffuse"]),
     "settle-glossy": Settle(NATIVE["glossy"]),
     "settle-own": Settle(OWN),
-    "settle-truer": Settle(NATIVE["diffuse"], 4, 0.75),
-    "settle-truer-glossy": Settle(NATIVE["glossy"], 4, 0.75),
+    "settle-truer": Settle(NATIVE["diffuse"], 0.75),
+    "settle-truer-glossy": Settle(NATIVE["glossy"], 0.75),
 }
 
 
@@ -54,7 +53,7 @@ def settle(suite: Suite, environment: str, case: str) -> None:
     name, wanted = f"{prefix_of(environment)}{case}", SETTLES[case]
     materials = wanted.materials
     base = suite.base(environment, materials)
-    rest = State(base.scene, dataclasses.replace(base.view, antialias=wanted.antialias))
+    rest = State(base.scene, dataclasses.replace(base.view, antialias=2, fine_edges=True))
     quality = {} if wanted.quality is None else {"quality": wanted.quality}
     moving, exact = suite.params(**quality), suite.params(refine=True, **quality)
     found = Measured()

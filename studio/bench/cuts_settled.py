@@ -32,37 +32,37 @@ F32 = npt.NDArray[np.float32]
 class Point:
     """How an edit is shown: while a hand moves something, or at rest until the first exact picture.
 
-    `antialias` by itself samples a pixel; `refined` meshes are those that the picture before came to rest on.
+    `antialias` by itself samples a pixel, and 16 with `edges` where something ends; `refined` meshes are
+    those that the picture before came to rest on.
     """
 
     name: str
     moving: bool
     antialias: int
     refined: bool = True
+    edges: bool = False
 
 
 PLAIN = Point("plain", True, 1, refined=False)
 MOVING = Point("moving", True, 1)
-SMOOTH = Point("smooth", True, 2)
-FINE = Point("fine", True, 4)
-REST = Point("rest", False, 2)
+EDGES = Point("edges", True, 1, edges=True)
+SMOOTH = Point("smooth", True, 2, edges=True)
+REST = Point("rest", False, 2, edges=True)
 ROUGH = Point("rough", False, 1, refined=False)
-FINEST = Point("finest", False, 4)
 
 
 def points(case: Case, environment: str) -> tuple[Point, ...]:
     """Where a case is measured, first as it is against brute force; under the sun, fewer.
 
-    A moved object at rest is a case of its own. Sixteen samples a pixel pay where the rays to them stay.
+    A moved object at rest is a case of its own.
     """
     everything = environment == ENVIRONMENTS[0]
     if not case.moving:
-        return (ROUGH, REST, FINEST) if everything else (ROUGH,)
-    if case.name.startswith("move"):
-        return (PLAIN, MOVING, SMOOTH) if everything else (PLAIN, SMOOTH)
-    if not everything:
-        return (PLAIN, SMOOTH, REST)
-    return (PLAIN, MOVING, SMOOTH, *(() if case.name == "camera" else (FINE,)), REST)
+        return (ROUGH, REST) if everything else (ROUGH,)
+    if case.name == "camera" or case.name.startswith("move"):
+        rest = () if case.name.startswith("move") else (REST,)
+        return (PLAIN, MOVING, EDGES, *rest) if everything else (PLAIN, EDGES)
+    return (PLAIN, MOVING, EDGES, SMOOTH, REST) if everything else (PLAIN, SMOOTH)
 
 
 def against_peer(suite: Suite, name: str, case: Case, environment: str) -> None:
@@ -101,11 +101,14 @@ def edited(suite: Suite, editor: Editor, case: Case, environment: str, point: Po
     edits = suite.setup.peer_edits if case.moving else suite.setup.peer_exact
     path = case.path(base, edits + 1, NATIVE[case.materials])
     params = suite.params(refine=point.refined, everywhere=case.everywhere)
-    settled = sampled(path[0], max(2, point.antialias) if point.refined else 1)
+    before = REST if point.refined else PLAIN
+    if point.moving and not case.name.startswith(("move", "camera")):
+        before = dataclasses.replace(before, antialias=point.antialias, edges=point.edges)  # rays are kept
+    settled = sampled(path[0], before)
     _, picture = editor.go(settled, params, moving=False)
     taken = []
     for state in path[1:]:
-        wanted = sampled(state, point.antialias)
+        wanted = sampled(state, point)
         if point.moving:
             step, picture = editor.go(wanted, params, moving=True)
             taken.append(step.seconds)
@@ -115,6 +118,7 @@ def edited(suite: Suite, editor: Editor, case: Case, environment: str, point: Po
     return picture.linear, Timing.of(taken[1:])
 
 
-def sampled(state: State, antialias: int) -> State:
-    """The state at so many by so many samples a pixel."""
-    return dataclasses.replace(state, view=dataclasses.replace(state.view, antialias=antialias))
+def sampled(state: State, point: Point) -> State:
+    """The state with a point's samples."""
+    view = dataclasses.replace(state.view, antialias=point.antialias, fine_edges=point.edges)
+    return dataclasses.replace(state, view=view)

@@ -418,7 +418,9 @@ import sys
 from studio.cli import main
 for command in {commands}:
     assert main(command) == 0, command
-    found = {{'PySide6', 'vispy', 'pyqtgraph', 'studio_ui'}} & {{name.split('.')[0] for name in sys.modules}}
+    found = {{'PySide6', 'vispy', 'pyqtgraph'}} & {{name.split('.')[0] for name in sys.modules}}
+    if command[0] != 'doctor':  # which asks the window's own report of the graphics card, in a child
+        found |= {{'studio_ui'}} & {{name.split('.')[0] for name in sys.modules}}
     assert not found, (command, found)
 """
     done = python("-c", source, cwd=files)

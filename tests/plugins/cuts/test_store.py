@@ -149,7 +149,7 @@ def test_cancelled_anywhere_and_moved_elsewhere(kit, workers, job, fresh, at, fi
         try:
             bench.traced(job=StoppingJob(at))
         except Cancelled:
-            known, whole = bench.store.known, len(kit.room.mesh)
+            known, whole = bench.store.known, len(bench.room.mesh)
             assert known < whole
         bench.follow(kit.room.placed(**MOVES[second])).traced()
     assert_fresh(bench, fresh, kit)
