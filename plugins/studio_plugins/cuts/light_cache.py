@@ -126,7 +126,8 @@ class LightCache:
     ) -> tuple[npt.NDArray[np.float32], Bools]:
         """Irradiance (V, 3) of the wanted vertices past what is not out of date, and where it is known.
 
-        Only so many are summed at once: whoever begins to drag something should not wait for it.
+        Where something is out of date only so many are summed at once: whoever begins to drag something
+        should not wait for it. Else, under a light that turns, it is the irradiance itself.
         """
         points = np.flatnonzero(wanted & (store.exact.stamp > 0))
         sources = store.standing()
@@ -135,7 +136,9 @@ class LightCache:
             self._standing = np.zeros((len(store.exact), 3), np.float32)
             self._standing_stamp = np.zeros(len(store.exact), np.int64)
             self._standing_state = state
-        fresh = points[self._standing_stamp[points] != store.exact.stamp[points]][:AT_ONCE]
+        fresh = points[self._standing_stamp[points] != store.exact.stamp[points]]
+        if len(store.unknown(points)):
+            fresh = fresh[:AT_ONCE]
         if len(fresh) and self._prefix is not None:
             self._irradiance(sources, mesh, fresh, self._standing, job)
             self._standing_stamp[fresh] = store.exact.stamp[fresh]

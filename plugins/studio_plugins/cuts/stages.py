@@ -17,6 +17,7 @@ import numpy.typing as npt
 from studio_core.contract import Services
 from studio_core.kernels.light_tree import LightTree
 from studio_core.kernels.refinement import descend
+from studio_core.kernels.suns import Sun
 from studio_core.scene.diff import Aspect
 from studio_core.scene.nodes import NodeId, Scene
 from studio_core.scene.transform import Transform
@@ -358,12 +359,13 @@ class LightStage:
         made: dict[NodeId, tuple[Source, Source | None]] = {}
         sun = lighting.sun
         if lighting.environment is not None and sun is not None and len(sun.directions):
-            ends = np.column_stack([sun.directions, np.zeros(len(sun.directions))])
-            made[lighting.environment.id] = (Source(ends, None, np.asarray(sun.irradiance, np.float32)), None)
+            few = sun.coarsened(wanted.moving_lamp_samples)
+            coarse = _sun_source(few) if len(few.directions) < len(sun.directions) else None
+            made[lighting.environment.id] = (_sun_source(sun), coarse)
         for lamp in lighting.lamps:
             exact = lamp_source(lamp, frame.params.lamp_samples)
-            coarse = lamp_source(lamp, min(wanted.moving_lamp_samples, frame.params.lamp_samples))
-            made[lamp.node] = (exact, coarse if len(coarse.targets) < len(exact.targets) else None)
+            rough = lamp_source(lamp, min(wanted.moving_lamp_samples, frame.params.lamp_samples))
+            made[lamp.node] = (exact, rough if len(rough.targets) < len(exact.targets) else None)
         return made
 
     def _moved(
@@ -387,6 +389,11 @@ class LightStage:
             made = []  # nothing was looked at yet
         self._placed, self._spheres = now, spheres
         return made
+
+
+def _sun_source(sun: Sun) -> Source:
+    ends = np.column_stack([sun.directions, np.zeros(len(sun.directions))])
+    return Source(ends, None, np.asarray(sun.irradiance, np.float32))
 
 
 def _same(a: Sequence[tuple[NodeId, Any]], b: Sequence[tuple[NodeId, Any]]) -> bool:
