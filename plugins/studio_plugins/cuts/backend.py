@@ -17,10 +17,11 @@ from studio_core.shading.job import Job
 from studio_core.shading.pipeline import Pipeline
 from studio_core.shading.stages import Adaptive, SurfaceParams, common_stages
 from studio_plugins.cuts.focus_stage import FocusStage
+from studio_plugins.cuts.light_stage import LightStage
 from studio_plugins.cuts.lobes import LobeTable
 from studio_plugins.cuts.quality import quality
 from studio_plugins.cuts.radiance_stage import RadianceStage
-from studio_plugins.cuts.stages import EXACT, PAPER, LightStage, VisibilityStage
+from studio_plugins.cuts.visibility_stage import EXACT, PAPER, VisibilityStage
 
 
 @dataclass(frozen=True)

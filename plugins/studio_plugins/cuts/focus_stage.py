@@ -18,10 +18,11 @@ from studio_core.shading.materials import coefficients, resolve
 from studio_core.shading.pipeline import Inputs
 from studio_plugins.cuts.choose import MOST_NODES, Prefix
 from studio_plugins.cuts.focus import focus_nodes
+from studio_plugins.cuts.light_stage import Arriving
 from studio_plugins.cuts.lobes import LobeTable
 from studio_plugins.cuts.nodes import FLOATS, NodeBlock, NodeTable, starts
 from studio_plugins.cuts.quality import quality
-from studio_plugins.cuts.stages import Arriving, Seen
+from studio_plugins.cuts.visibility_stage import Seen
 
 F32 = npt.NDArray[np.float32]
 I64 = npt.NDArray[np.int64]

@@ -16,8 +16,9 @@ from studio_core.shading.job import Job
 from studio_core.shading.pipeline import Inputs
 from studio_plugins.cuts.fill import fill, lift
 from studio_plugins.cuts.focus_stage import Focused
+from studio_plugins.cuts.light_stage import Arriving
 from studio_plugins.cuts.nodes import NodeTable
-from studio_plugins.cuts.stages import Arriving, Seen
+from studio_plugins.cuts.visibility_stage import Seen
 
 F32 = npt.NDArray[np.float32]
 I64 = npt.NDArray[np.int64]

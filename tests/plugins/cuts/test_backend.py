@@ -27,8 +27,8 @@ from studio_core.shading.job import Job
 from studio_core.shading.materials import coefficients, resolve
 from studio_core.shading.offline import backend_params, scene_view, shade
 from studio_core.shading.pipeline import Pipeline
-from studio_plugins.cuts import light_cache, stages
-from studio_plugins.cuts.stages import Seen
+from studio_plugins.cuts import light_cache, light_stage, visibility_stage
+from studio_plugins.cuts.visibility_stage import Seen
 
 FAST = {"directions": "1024", "vertices": 700, "refine": False, "lamp_samples": 8}
 
@@ -639,7 +639,7 @@ def wrong(bench, made, exact):
 
 @pytest.mark.parametrize("name", ["move", "add", "turn", "mesh"])
 def test_what_takes_long_is_seen_quickly_before_it_is_exact(room, monkeypatch, name):
-    monkeypatch.setattr(stages, "LONG", 0.0)
+    monkeypatch.setattr(visibility_stage, "LONG", 0.0)
     published, job = listening()
     before = room.made
     final = room.do(EDITS[name], job)
@@ -653,9 +653,9 @@ def test_what_takes_long_is_seen_quickly_before_it_is_exact(room, monkeypatch, n
 
 
 def test_after_a_release_the_first_picture_is_no_worse_than_the_last_moving_one(room, monkeypatch):
-    monkeypatch.setattr(stages, "LONG", 0.0)
-    monkeypatch.setattr(stages, "QUICK", 0.0)  # previews do not become finer meanwhile
-    monkeypatch.setattr(stages, "SLOW", 1e9)
+    monkeypatch.setattr(visibility_stage, "LONG", 0.0)
+    monkeypatch.setattr(visibility_stage, "QUICK", 0.0)  # previews do not become finer meanwhile
+    monkeypatch.setattr(visibility_stage, "SLOW", 1e9)
     moving = room.do(MOVE, moving=True)
     rays = moving.counts["rays"]
     published, job = listening()
@@ -668,7 +668,7 @@ def test_after_a_release_the_first_picture_is_no_worse_than_the_last_moving_one(
 
 
 def test_what_takes_no_time_is_shown_exact_at_once(room, monkeypatch):
-    monkeypatch.setattr(stages, "LONG", 1e9)
+    monkeypatch.setattr(visibility_stage, "LONG", 1e9)
     published, job = listening()
     final = room.do(MOVE, job)
     assert [made.final for made in published] == [True]
@@ -682,7 +682,7 @@ def test_fine_shadows_of_what_stands_still_stay_during_a_drag(host, services, mo
     room.update(Changes())
     parts = [room.do(MOVE, moving=True)]
     parts += [room.update(view_changed(), moving=True) for _ in range(8)]
-    past, known = room.pipeline.artifact(stages.Arriving).standing["sky"]
+    past, known = room.pipeline.artifact(light_stage.Arriving).standing["sky"]
     assert known.sum() > 80
     published, job = listening()
     room.update(view_changed(), job)

@@ -18,7 +18,7 @@ from studio_core.shading.frame import Frame
 from studio_core.shading.job import Job
 from studio_core.shading.offline import backend_params, scene_view, shade
 from studio_core.shading.pipeline import Pipeline
-from studio_plugins.cuts import focus_stage, stages
+from studio_plugins.cuts import focus_stage, light_stage
 from studio_plugins.cuts.choose import MOST_NODES
 from studio_plugins.cuts.focus import lobe_error
 from studio_plugins.cuts.focus_stage import Focused, FocusStage
@@ -46,7 +46,7 @@ def scene_of(model, seed=0, **values):
 def cuts(scene, host, services, monkeypatch, lobe, tolerance=2e-4) -> tuple[Radiance, Pipeline]:
     """By the cuts with these tolerances."""
     wanted = dataclasses.replace(quality(0.5), lobe=lobe, tolerance=tolerance)
-    for module in (stages, focus_stage):
+    for module in (light_stage, focus_stage):
         monkeypatch.setattr(module, "quality", lambda control: wanted)
     backend = host.get("backend", "cuts")
     pipeline = Pipeline(backend.stages(services))

@@ -16,8 +16,9 @@ from studio_core.shading.job import Job
 from studio_core.shading.offline import backend_params, scene_view
 from studio_core.shading.pipeline import Pipeline
 from studio_plugins.cuts.guides import guess, packets_around
-from studio_plugins.cuts.stages import LightStage, VisibilityStage
+from studio_plugins.cuts.light_stage import LightStage
 from studio_plugins.cuts.store import VisibilityStore
+from studio_plugins.cuts.visibility_stage import VisibilityStage
 
 
 @pytest.mark.parametrize("k", [10, 13, 15])

@@ -17,7 +17,7 @@ from studio_core.shading.job import Job
 from studio_core.shading.offline import backend_params, scene_view, shade
 from studio_core.shading.pipeline import Pipeline
 from studio_plugins.cuts import keeping
-from studio_plugins.cuts.stages import VisibilityStage
+from studio_plugins.cuts.visibility_stage import VisibilityStage
 
 VALUES = {"directions": "1024", "vertices": 600, "refine": False}
 
