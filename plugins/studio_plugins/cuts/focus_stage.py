@@ -190,7 +190,7 @@ class FocusStage:
 
 
 def turned(positions: F32, before: F32, eye: F32) -> F32:
-    """By how much (P,), in radians, the way from positions (P, 3) to the eye differs from before (P, 3)."""
+    """The chord (P,) between the unit ways from positions (P, 3) to where the eye was (P, 3) and is."""
     was, now = before - positions, eye - positions
     was /= np.maximum(np.linalg.norm(was, axis=1, keepdims=True), np.float32(1e-12))
     now /= np.maximum(np.linalg.norm(now, axis=1, keepdims=True), np.float32(1e-12))

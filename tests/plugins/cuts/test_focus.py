@@ -11,8 +11,9 @@ from hypothesis import strategies as st
 from scenes import little_scene
 
 from studio_core.contract import Services
-from studio_core.scene.diff import Changes
+from studio_core.scene.diff import Changes, view_changed
 from studio_core.scene.geometry import Image
+from studio_core.scene.transform import Transform
 from studio_core.shading.artifacts import Radiance
 from studio_core.shading.frame import Frame
 from studio_core.shading.job import Job
@@ -21,7 +22,7 @@ from studio_core.shading.pipeline import Pipeline
 from studio_plugins.cuts import focus_stage, light_stage
 from studio_plugins.cuts.choose import MOST_NODES
 from studio_plugins.cuts.focus import lobe_error
-from studio_plugins.cuts.focus_stage import Focused, FocusStage
+from studio_plugins.cuts.focus_stage import Focused, FocusStage, turned
 from studio_plugins.cuts.quality import quality
 
 VALUES = {"directions": "4096", "vertices": 500, "everywhere": True}
@@ -142,3 +143,47 @@ def test_estimates_are_finite_and_grow_with_the_spread(light, view, around, spre
     assert estimate(spread, 0.0) == 0
     assert estimate(spread) <= 1.001 * estimate(2 * spread) + 1e-12
     assert estimate(0.0) <= 1e-6
+
+
+def test_what_was_split_outlasts_small_turns_of_the_eye(host, services, monkeypatch):
+    """While somebody looks around; at rest it is split for the eye that looks."""
+    split = []
+    own = FocusStage._split
+
+    def counted(self, base, prefix, inputs, stale, *rest):
+        split.append(int(stale.sum()))
+        own(self, base, prefix, inputs, stale, *rest)
+
+    monkeypatch.setattr(FocusStage, "_split", counted)
+    scene = scene_of("ggx", base_color=(0.9, 0.9, 0.9), roughness=0.5)
+    backend = host.get("backend", "cuts")
+    pipeline = Pipeline(backend.stages(services))
+    params = backend_params(backend, {**VALUES, "refine": False})
+    view = scene_view(scene, None, 32, 24)
+
+    def look(aside, moving):
+        split.clear()
+        placed = Transform((aside, 0.0, 0.0)) @ view.transform
+        seen = dataclasses.replace(view, transform=placed)
+        changes = Changes() if not aside and not moving else view_changed()
+        made = pipeline.update(Frame(scene, seen, params, 1, moving), changes, Job("test"))
+        return made, sum(split)
+
+    _, everything = look(0.0, False)
+    assert everything > 0
+    assert look(1e-3, True)[1] == 0
+    near, count = look(1.5, True)
+    assert 0 < count <= everything
+    exact, count = look(1.5, False)
+    assert count == everything
+    assert 0 < wrong(near, exact) < 0.05
+
+
+def test_turns_are_angles():
+    rng = np.random.default_rng(3)
+    positions, before, eye = rng.normal(size=(3, 50, 3)).astype(np.float32)
+    was, now = before - positions, eye - positions
+    cosine = (was * now).sum(axis=1) / np.linalg.norm(was, axis=1) / np.linalg.norm(now, axis=1)
+    expected = 2 * np.sin(np.arccos(np.clip(cosine, -1, 1)) / 2)  # of the chord
+    np.testing.assert_allclose(turned(positions, before, eye), expected, atol=1e-5)
+    assert turned(positions, eye, eye).max() == 0
