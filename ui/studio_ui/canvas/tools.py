@@ -15,10 +15,10 @@ from studio_core.scene.diff import Changes
 from studio_core.scene.nodes import Environment, NodeId, Scene
 from studio_core.session import Session
 from studio_core.signal import Signal
-from studio_ui.canvas import navigation
 from studio_ui.canvas.drags import Drag, LightDrag, MoveDrag, TurnDrag, is_locked, roots
 from studio_ui.canvas.glyphs import glyphs
-from studio_ui.canvas.projection import bounds, box_segments, eye_of, ray
+from studio_ui.canvas.looking import Looking
+from studio_ui.canvas.projection import bounds, box_segments
 from studio_ui.canvas.viewport import Pointer, Viewport
 from studio_ui.editing import Editing
 from studio_ui.feed import PictureFeed
@@ -43,12 +43,11 @@ class CanvasTools:
         self.tool_changed: Signal[[str]] = Signal()
         self.entered: NodeId | None = None  # the group whose parts are chosen
         self._viewport, self._document, self._session = viewport, document, session
-        self._editing, self._feed, self._hint = editing, feed, hint
+        self.looking = Looking(viewport, document, session, feed)
+        self._editing, self._hint = editing, hint
         self._press: Pointer | None = None
-        self._last: Pointer | None = None
-        self._mode = ""  # "", click, orbit, pan, zoom, drag
+        self._mode = ""  # "", click, look, drag
         self._drag: Drag | None = None
-        self._pivot: np.ndarray | None = None
         self._turning = False  # R is held
         self._off = [
             viewport.pointer.connect(self._on_pointer),
@@ -76,7 +75,7 @@ class CanvasTools:
         chosen = [n for n in self._session.selection if n in scene.nodes]
         self._viewport.set_selection(below for node in chosen for below in scene.subtree(node))
         boxes = None
-        found = bounds(scene, chosen) if self._mode in ("drag", "orbit", "pan") and chosen else None
+        found = bounds(scene, chosen) if self._mode in ("drag", "look") and chosen else None
         if found is not None:
             boxes = box_segments(*found)
         self._viewport.set_guides(view, glyphs(scene, view, chosen), boxes)
@@ -119,10 +118,9 @@ class CanvasTools:
             self._moved(pointer)
         elif pointer.kind == "release" and self._press is not None:
             self._released(pointer)
-        self._last = pointer
 
     def _pressed(self, pointer: Pointer) -> None:
-        self._press = self._last = pointer
+        self._press = pointer
         self._mode = "click"
 
     def _enter(self, pointer: Pointer) -> None:
@@ -140,50 +138,24 @@ class CanvasTools:
 
     def _moved(self, pointer: Pointer) -> None:
         assert self._press is not None
-        assert self._last is not None
         if self._mode == "click" and _slip(self._press, pointer) > CLICK:
             self._start(self._press)
-        height = max(pointer.pixels[1], 1)
-        dx = (pointer.x - self._last.x) * pointer.pixels[0] / height
-        dy = pointer.y - self._last.y
-        view = self._session.view
-        if self._mode == "orbit":
-            self._session.look(navigation.orbit(view, dx, dy, self._pivot))
-        elif self._mode == "pan":
-            distance = None
-            if self._pivot is not None:
-                distance = float(np.linalg.norm(self._pivot - eye_of(view)))
-            self._session.look(navigation.pan(view, dx, dy, distance))
-        elif self._mode == "zoom":
-            self._session.look(navigation.zoom(view, float(np.exp(3 * dy))))
+        if self._mode == "look":
+            self.looking.move(pointer)
         elif self._mode == "drag" and self._drag is not None:
             self._editing.preview(self, self._drag.edit(pointer))
 
     def _start(self, press: Pointer) -> None:
         """A click has become a drag."""
-        scene, view = self._document.scene, self._session.view
-        probe = self._viewport.probe(press.x, press.y)
-        self._pivot = None
-        if probe is not None and np.isfinite(probe.distance):
-            self._pivot = eye_of(view) + ray(view, press.x, press.y) * probe.distance
-        self._drag = self._drag_for(press, scene)
-        if self._drag is not None:
-            if self._editing.begin(self, self._drag.label):
-                self._mode = "drag"
-            else:
-                self._mode, self._drag = "", None
-                return
-        elif press.button == "right" or (press.button == "middle" and press.shift):
-            self._mode = "pan"
-        elif press.button == "middle" and press.ctrl:
-            self._mode = "zoom"
+        self._drag = self._drag_for(press, self._document.scene)
+        if self._drag is None:
+            self._mode = "look"
+            self.looking.start(self.looking.mode_of(press), press)
+        elif self._editing.begin(self, self._drag.label):
+            self._mode = "drag"  # the window holds for every gesture that edits
         else:
-            self._mode = "orbit"
-            if self._session.selection:
-                chosen = bounds(scene, (n for n in self._session.selection if n in scene.nodes))
-                self._pivot = (chosen[0] + chosen[1]) / 2 if chosen is not None else self._pivot
-        if self._mode != "drag":  # the window holds for every gesture that edits
-            self._feed.hold()
+            self._mode, self._drag = "", None
+            return
         self.refresh()
 
     def _drag_for(self, press: Pointer, scene: Scene) -> Drag | None:
@@ -200,7 +172,7 @@ class CanvasTools:
             return None
         if self.tool == "rotate" or self._turning:
             return TurnDrag(scene, nodes, press)
-        point = self._pivot
+        point = self.looking.touched(press.x, press.y)
         if point is None or self._viewport.glyph_at(press.x, press.y) is not None:
             point = np.array(scene.world(picked).translation)
         return MoveDrag(scene, nodes, self._session.view, point)
@@ -213,8 +185,8 @@ class CanvasTools:
             self._click(pointer)
         elif mode == "drag":
             self._editing.commit(self)
-        elif mode in ("orbit", "pan", "zoom"):
-            self._feed.release()
+        elif mode == "look":
+            self.looking.end()
         self.refresh()
 
     def _click(self, pointer: Pointer) -> None:
@@ -230,13 +202,8 @@ class CanvasTools:
         self._session.select([picked] if picked is not None else [])
 
     def _on_wheel(self, pointer: Pointer, steps: float) -> None:
-        if self._mode == "drag":
-            return
-        probe = self._viewport.probe(pointer.x, pointer.y)
-        distance = probe.distance if probe is not None else None
-        self._feed.step()
-        view = navigation.zoom(self._session.view, 0.86**steps, pointer.x, pointer.y, distance)
-        self._session.look(view)
+        if self._mode != "drag":
+            self.looking.wheel(pointer, steps)
 
     def _on_key(self, key: str, pressed: bool) -> None:
         if key == "escape" and pressed:
