@@ -243,7 +243,7 @@ class Driver:
 
     def do(self, action: str) -> None:
         """Trigger an action as its menu does."""
-        self.bot.waitUntil(lambda: not self.window._soon.isActive(), timeout=5000)
+        self.bot.waitUntil(lambda: not self.window.following.pending, timeout=5000)
         assert self.window.actions_[action].isEnabled(), action
         self.window.actions_[action].trigger()
 

@@ -137,7 +137,7 @@ def switching(bench: Bench) -> dict[str, Any]:
     context = bench.studio.context
     context.session.select(["cube"])
     context.session.display(exposure=0.5, tonemap="filmic")
-    bench.window.set_grid(True)
+    bench.window.appearance.set_grid(True)
     bench.wait(bench.settled)
     first = bench.grab()
     bench.gpu()

@@ -146,7 +146,7 @@ def test_shift_moves_up_and_ctrl_keeps_to_the_grid(driver: Driver) -> None:
 def test_arrow_keys_nudge_in_the_picture_only(driver: Driver) -> None:
     driver.click(STOOL)
     driver.viewport.setFocus()
-    driver.until(lambda: not driver.window._soon.isActive())
+    driver.until(lambda: not driver.window.following.pending)
     driver.bot.keyClick(driver.viewport, Qt.Key.Key_Right)
     assert driver.document.scene.world("stool").translation == pytest.approx((1.05, 0, 0))
     driver.bot.keyClick(driver.viewport, Qt.Key.Key_Up)

@@ -168,7 +168,7 @@ def test_a_canvas_without_a_context_gives_way(make: Make, monkeypatch: pytest.Mo
 
 def test_another_canvas_is_told_everything(driver: Driver, qtbot: QtBot) -> None:
     driver.session.select(["chair"])
-    driver.window.set_grid(True)
+    driver.window.appearance.set_grid(True)
     driver.session.display(exposure=1.0, tonemap="raw")
     before = driver.viewport.grab_image()
     heard: list[object] = []

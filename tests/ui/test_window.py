@@ -19,7 +19,7 @@ from ui_support import Driver, Make, room
 
 from studio_core.document import Document
 from studio_core.registry import PluginHost
-from studio_ui.actions import ACTIONS, specs
+from studio_ui.actions.catalogue import ACTIONS, specs
 from studio_ui.dialogs import KeysDialog, PluginsDialog, UnitDialog, likely_unit
 from studio_ui.feed import REST_MS
 from studio_ui.icons import ICONS, icon
@@ -55,7 +55,7 @@ def test_every_action_is_reachable_and_told_apart(driver: Driver) -> None:
         for action in menu.actions()
         if not action.isSeparator()
     }
-    driver.until(lambda: not driver.window._soon.isActive())
+    driver.until(lambda: not driver.window.following.pending)
     for spec in specs():
         assert driver.window.actions_[spec.id].text() in shown
     assert None in ACTIONS
@@ -63,7 +63,7 @@ def test_every_action_is_reachable_and_told_apart(driver: Driver) -> None:
 
 def test_what_cannot_be_done_is_disabled(make: Make) -> None:
     driver = make()
-    driver.until(lambda: not driver.window._soon.isActive())
+    driver.until(lambda: not driver.window.following.pending)
     enabled = {name: action.isEnabled() for name, action in driver.window.actions_.actions.items()}
     assert not enabled["edit.undo"]
     assert not enabled["edit.delete"]
@@ -208,12 +208,12 @@ def test_help_and_lists_open(driver: Driver) -> None:
     assert len(opened) == 2
     for dialog in opened:
         dialog.close()
-    driver.window._fill_recent()
-    driver.window._fill_cameras()
-    assert driver.window._camera_menu.actions()[0].text() == "None yet"
+    driver.window.menus.fill_recent()
+    driver.window.menus.fill_cameras()
+    assert driver.window.menus.cameras.actions()[0].text() == "None yet"
     driver.do("view.new_camera")
-    driver.window._fill_cameras()
-    assert driver.window._camera_menu.actions()[0].text() == "Camera"
+    driver.window.menus.fill_cameras()
+    assert driver.window.menus.cameras.actions()[0].text() == "Camera"
     assert driver.window.view_controls.camera.currentText() == "Camera"
 
 

@@ -14,7 +14,7 @@ from studio_core.session import View
 from studio_ui.canvas import navigation
 from studio_ui.canvas.drags import dropped, is_locked, middle, named, roots, shifted, turned
 from studio_ui.canvas.projection import bounds
-from studio_ui.canvas.tools import CanvasTools
+from studio_ui.canvas.tools import TOOLS, CanvasTools
 from studio_ui.context import Context
 
 STEP = 0.05  # metres
@@ -59,7 +59,7 @@ class Commands:
         nudges |= {"up": (0, 1, 0), "down": (0, -1, 0)}
         for name, way in nudges.items():
             made[f"object.{name}"] = partial(self.nudge, *way)
-        for tool in ("select", "move", "rotate"):
+        for tool in TOOLS:
             made[f"tool.{tool}"] = partial(self._tools.use, tool)
         for axis in navigation.AXES:
             made[f"view.{axis}"] = partial(self.look_from, axis)
@@ -75,15 +75,17 @@ class Commands:
             "movable": lambda: bool(roots(document.scene, self.chosen)),
             "camera": lambda: any(isinstance(document.scene[n], Camera) for n in self.chosen),
             "group": lambda: any(isinstance(document.scene[n], Group) for n in self.chosen),
-            "picture": lambda: feed.last is not None,
             "computing": lambda: feed.busy,
-        }
+        } | {f"tool_{tool}": partial(self._uses, tool) for tool in TOOLS}
 
     @property
     def chosen(self) -> tuple[NodeId, ...]:
         """The selection, without what is gone."""
         scene = self._context.document.scene
         return tuple(n for n in self._context.session.selection if n in scene.nodes)
+
+    def _uses(self, tool: str) -> bool:
+        return self._tools.tool == tool
 
     # scene
 

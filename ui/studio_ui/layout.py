@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import base64
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from itertools import pairwise
 
 from PySide6.QtCore import QByteArray, Qt
@@ -49,6 +49,14 @@ class Layout:
         sides = [docks["outliner"], docks["properties"]]
         window.resizeDocks(sides, [PANEL_WIDTH - 40, PANEL_WIDTH + 20], Qt.Orientation.Horizontal)
         self._first = QByteArray()
+
+    def handlers(self) -> dict[str, Callable[[], object]]:
+        """By action id."""
+        return {"window.reset": self.reset}
+
+    def conditions(self) -> dict[str, Callable[[], bool]]:
+        """None."""
+        return {}
 
     def restore(self) -> None:
         """As it was left; what is here now becomes what `reset` goes back to."""

@@ -76,6 +76,23 @@ class ProjectFiles:
         """Whether something is in no file."""
         return self._context.document.modified
 
+    def handlers(self) -> dict[str, Callable[[], object]]:
+        """By action id."""
+        return {
+            "file.new": self.new,
+            "file.open": self.choose,
+            "file.save": self.save,
+            "file.save_as": self.save_as,
+        }
+
+    def conditions(self) -> dict[str, Callable[[], bool]]:
+        """By name."""
+        return {"savable": lambda: self.modified or self.path is None}
+
+    def beside(self, suffix: str) -> Path:
+        """A file of that suffix beside the project, to suggest for exports."""
+        return (self.path.parent if self.path else Path.home()) / f"{self.name}{suffix}"
+
     # new and open
 
     def new(self) -> None:
@@ -89,6 +106,12 @@ class ProjectFiles:
         self._restore((Step("New", scene),), 0)
         take_session(self._context.session, {}, scene, [])
         self.opened.emit()
+
+    def choose(self) -> None:
+        """Ask for a project and open it."""
+        chosen = self._ask.open_files("Open project", [PROJECTS])
+        if chosen:
+            self.open(chosen[0])
 
     def open(self, path: Path, *, read_only: bool = False) -> None:
         """Open a project after asking about unsaved changes."""

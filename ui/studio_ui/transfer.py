@@ -30,8 +30,29 @@ PNG, EXR = Filter("PNG picture, as shown", (".png",)), Filter("OpenEXR, scene-li
 class Transfer:
     """Imports and exports of the window; all reading and writing happens on the files' thread."""
 
-    def __init__(self, context: Context, ask: Ask, frame_all: Callable[[], object]) -> None:
-        self._context, self._ask, self._frame_all = context, ask, frame_all
+    def __init__(
+        self,
+        context: Context,
+        ask: Ask,
+        frame_all: Callable[[], object],
+        beside: Callable[[str], Path],
+    ) -> None:
+        """`beside` tells where a file of a suffix is suggested to be written."""
+        self._context, self._ask, self._frame_all, self._beside = context, ask, frame_all, beside
+
+    def handlers(self) -> dict[str, Callable[[], object]]:
+        """By action id."""
+        return {
+            "file.import": self.import_models,
+            "file.environment": self.load_environment,
+            "file.export_picture": lambda: self.export_picture(self._beside(".png")),
+            "file.export_glb": lambda: self.export_scene("glb", self._beside(".glb")),
+            "file.export_mitsuba": lambda: self.export_scene("mitsuba", self._beside("")),
+        }
+
+    def conditions(self) -> dict[str, Callable[[], bool]]:
+        """By name."""
+        return {"picture": lambda: self._context.feed.last is not None}
 
     # in
 

@@ -1,0 +1,15 @@
+"""The Edit menu."""
+
+from studio_ui.actions.spec import SEPARATOR, ActionSpec, Item
+
+ITEMS: tuple[Item, ...] = (
+    ActionSpec("edit.undo", "Undo", "Edit", "Ctrl+Z", icon="undo", bar=True, enabled="undo"),
+    ActionSpec("edit.redo", "Redo", "Edit", "Ctrl+Shift+Z", icon="redo", bar=True, enabled="redo"),
+    SEPARATOR,
+    ActionSpec("edit.duplicate", "Duplicate", "Edit", "Ctrl+D", "A copy beside it; the mesh is shared",
+               icon="duplicate", enabled="selection"),
+    ActionSpec("edit.delete", "Delete", "Edit", "Delete", icon="delete", enabled="selection"),
+    SEPARATOR,
+    ActionSpec("edit.select_all", "Select all", "Edit", "Ctrl+A"),
+    ActionSpec("edit.select_none", "Select nothing", "Edit", "Ctrl+Shift+A", enabled="selection"),
+)  # fmt: skip

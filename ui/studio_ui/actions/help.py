@@ -1,0 +1,9 @@
+"""The Help menu."""
+
+from studio_ui.actions.spec import ActionSpec, Item
+
+ITEMS: tuple[Item, ...] = (
+    ActionSpec("help.keys", "Keys and mouse", "Help", "F1"),
+    ActionSpec("help.plugins", "Plugins", "Help"),
+    ActionSpec("help.about", "About Lucarne", "Help"),
+)

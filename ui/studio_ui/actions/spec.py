@@ -1,0 +1,50 @@
+"""What an action is, as data, and why one cannot be done."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class ActionSpec:
+    """One action: `menu` is a path (`Edit`, `View/Look from`), `tip` says what its name does not.
+
+    `enabled` and `checked` name conditions (see `REASONS`). `canvas` limits the shortcut to the picture;
+    actions of one `group` exclude each other; `bar` puts it on the toolbar.
+    """
+
+    id: str
+    text: str
+    menu: str
+    shortcut: str = ""
+    tip: str = ""
+    icon: str = ""
+    enabled: str = ""
+    checked: str = ""
+    canvas: bool = False
+    bar: bool = False
+    group: str = ""
+
+    @property
+    def checkable(self) -> bool:
+        """Whether it shows a check mark while it is on."""
+        return bool(self.group or self.checked)
+
+
+SEPARATOR = None
+"""A line between the actions of a menu."""
+
+Item = ActionSpec | None
+
+REASONS = {
+    "undo": "Nothing to undo",
+    "redo": "Nothing to redo",
+    "selection": "Nothing is chosen",
+    "movable": "Nothing is chosen that can be moved",
+    "camera": "No camera is chosen",
+    "group": "No group is chosen",
+    "savable": "Nothing has changed since it was saved",
+    "picture": "There is no picture yet",
+    "computing": "Nothing is being computed",
+}
+"""Every condition that `enabled` names, with what is told while it does not hold."""

@@ -1,0 +1,42 @@
+"""The Help menu: keys and mouse, plugins, about."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from PySide6.QtWidgets import QMessageBox, QWidget
+
+from studio_core import __version__
+from studio_core.registry import PluginHost
+from studio_ui.actions.catalogue import specs
+from studio_ui.actions.mouse import MOUSE
+from studio_ui.dialogs import KeysDialog, PluginsDialog
+
+
+class Help:
+    """Windows that tell about the program."""
+
+    def __init__(self, parent: QWidget, host: PluginHost) -> None:
+        self._parent, self._host = parent, host
+
+    def handlers(self) -> dict[str, Callable[[], object]]:
+        """By action id."""
+        return {"help.keys": self.keys, "help.plugins": self.plugins, "help.about": self.about}
+
+    def conditions(self) -> dict[str, Callable[[], bool]]:
+        """None."""
+        return {}
+
+    def keys(self) -> None:
+        """What mouse and keys do."""
+        keys = [(spec.text.rstrip("…"), spec.shortcut) for spec in specs() if spec.shortcut]
+        KeysDialog(self._parent, [*MOUSE, *keys]).open()
+
+    def plugins(self) -> None:
+        """What is loaded and what failed."""
+        PluginsDialog(self._parent, self._host).open()
+
+    def about(self) -> None:
+        """Which version this is."""
+        text = f"<b>Lucarne {__version__}</b><p>Furnish and light rooms truthfully.</p>"
+        QMessageBox.about(self._parent, "About Lucarne", text)

@@ -1,0 +1,35 @@
+"""Every panel of the window, and on which side it is at first."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from PySide6.QtCore import Qt
+
+from studio_ui.context import Context
+from studio_ui.panels.history import HistoryPanel
+from studio_ui.panels.jobs import JobsPanel
+from studio_ui.panels.lighting import LightingPanel
+from studio_ui.panels.log import LogPanel
+from studio_ui.panels.materials import MaterialsPanel
+from studio_ui.panels.outliner import OutlinerPanel
+from studio_ui.panels.panel import Panel
+from studio_ui.panels.properties import PropertiesPanel
+from studio_ui.panels.shading import ShadingPanel
+
+
+def all_panels(
+    context: Context, load_environment: Callable[[], object]
+) -> list[tuple[Panel, Qt.DockWidgetArea]]:
+    """The panels in the order of the Window menu; tabs are in `layout`."""
+    left, right = Qt.DockWidgetArea.LeftDockWidgetArea, Qt.DockWidgetArea.RightDockWidgetArea
+    return [
+        (OutlinerPanel(context), left),
+        (HistoryPanel(context), left),
+        (JobsPanel(context), left),
+        (LogPanel(context), left),
+        (PropertiesPanel(context), right),
+        (MaterialsPanel(context), right),
+        (LightingPanel(context, load_environment), right),
+        (ShadingPanel(context), right),
+    ]
