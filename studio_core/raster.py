@@ -363,7 +363,7 @@ def _add_light(given: tuple[Any, ...], start: int, stop: int) -> None:
 
 def _pixel_angle(view: View) -> float:
     """Radians between samples, about."""
-    return float(2 * np.tan(np.radians(view.fov) / 2) / (view.height * view.antialias))
+    return float(2 * np.tan(np.radians(view.fov) / 2) / (view.rows * view.antialias))
 
 
 def _parts(hits: Hits, surfaces: Surfaces) -> tuple[_Part, ...]:

@@ -21,7 +21,8 @@ class View:
     """A pinhole camera: world from camera, vertical angle in degrees, pixels, orbit distance in metres.
 
     A pixel is the mean of `antialias`² samples; with `fine_edges` those in which something ends have 16 where
-    that is more. Raises ValueError for a view of nothing.
+    that is more. Where `whole` is not 0 this is a part: `height` rows from row `top` on of a picture that is
+    `whole` rows high, and `fov` is that of the whole. Raises ValueError for a view of nothing.
     """
 
     transform: Transform = IDENTITY
@@ -31,10 +32,14 @@ class View:
     focus: float = 3.0
     antialias: int = 2
     fine_edges: bool = False
+    top: int = 0
+    whole: int = 0
 
     def __post_init__(self) -> None:
         if min(self.width, self.height, self.antialias) < 1 or not 0 < self.fov < 180:
             raise ValueError("a view needs pixels, samples in them, and an angle between 0 and 180°")
+        if self.top < 0 or ((self.whole or self.top) and self.top + self.height > self.whole):
+            raise ValueError("a part of a picture must lie in it")
 
     @classmethod
     def of(cls, camera: Camera, scene: Scene, width: int, height: int) -> View:
@@ -47,6 +52,15 @@ class View:
         """The point that the view orbits, world."""
         x, y, z, _ = (float(v) for v in self.transform.matrix() @ (0.0, 0.0, -self.focus, 1.0))
         return (x, y, z)
+
+    @property
+    def rows(self) -> int:
+        """Pixels down the whole picture, of which this may be a part."""
+        return self.whole or self.height
+
+    def part(self, top: int, height: int) -> View:
+        """Some rows of the picture. ValueError where they are not in it."""
+        return dataclasses.replace(self, top=top, height=height, whole=self.rows)
 
     def sized(self, width: int, height: int) -> View:
         """The same view in other pixels."""

@@ -6,6 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from studio_core.jit import kernel
+from studio_core.kernels.camera import TOP, WHOLE
 from studio_core.kernels.directions import arctangent
 
 F32 = npt.NDArray[np.float32]
@@ -49,7 +50,8 @@ def background_hits(
     """
     width, n = int(pinhole[0]), int(pinhole[1])
     high, wide = pixels.shape[0], pixels.shape[1]
-    right, up = 2 * pinhole[2] / (width * n), 2 * pinhole[3] / (pinhole[4] * n)
+    right, up = 2 * pinhole[2] / (width * n), 2 * pinhole[3] / (pinhole[WHOLE] * n)
+    above = int(pinhole[TOP]) * n
     xx, xy, xz = turn[0]
     yx, yy, yz = turn[1]
     zx, zy, zz = turn[2]
@@ -69,7 +71,7 @@ def background_hits(
                 i, j = inner % n, inner // n
             if face[hit] < 0:
                 s[found] = (left + i + 0.5) * right - pinhole[2]
-                t[found] = pinhole[3] - (top + j + 0.5) * up
+                t[found] = pinhole[3] - (above + top + j + 0.5) * up
                 here[found] = hit - start
                 found += 1
             hit += 1

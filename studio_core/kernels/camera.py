@@ -1,8 +1,9 @@
 """Samples of a picture: their directions, and what they see first.
 
 A picture of W × H pixels has n × n samples in each; sample s belongs to pixel s // n² (row by row from the
-top left) and lies at (s % n², from the top left) in it. A pinhole is 14 numbers: W, n, tangent of half the
-angle across and up, pixels up, then the 3×3 rotation world from camera, row by row.
+top left) and lies at (s % n², from the top left) in it. A pinhole is 16 numbers: W, n, tangent of half the
+angle across and up, H, then the 3×3 rotation world from camera, row by row, then TOP and WHOLE: the picture
+is rows TOP … TOP + H − 1 of one that has WHOLE rows, to which the angles belong.
 """
 
 from __future__ import annotations
@@ -34,7 +35,8 @@ F64 = npt.NDArray[np.float64]
 I32 = npt.NDArray[np.int32]
 I64 = npt.NDArray[np.int64]
 
-PINHOLE = 14
+PINHOLE = 16
+TOP, WHOLE = 14, 15
 TILE_WIDTH, TILE_HEIGHT = 4, 2
 COHERENT = 1 << 16  # RTC_RAY_QUERY_FLAG_COHERENT
 
@@ -45,9 +47,9 @@ def sample_direction(pinhole: F64, sample: int, out: F32) -> None:
     width, n = int(pinhole[0]), int(pinhole[1])
     pixel, inner = sample // (n * n), sample % (n * n)
     x = (pixel % width) * n + inner % n
-    y = (pixel // width) * n + inner // n
+    y = (int(pinhole[TOP]) + pixel // width) * n + inner // n
     a = ((x + 0.5) / (width * n) * 2 - 1) * pinhole[2]
-    b = (1 - (y + 0.5) / (pinhole[4] * n) * 2) * pinhole[3]
+    b = (1 - (y + 0.5) / (pinhole[WHOLE] * n) * 2) * pinhole[3]
     scale = 1.0 / np.sqrt(a * a + b * b + 1.0)
     a, b, c = a * scale, b * scale, -scale
     for axis in range(3):
@@ -125,7 +127,8 @@ def first_hits(
     arguments = coherent_arguments()
     n = int(pinhole[1])
     columns, rows = int(pinhole[0]) * n, int(pinhole[4]) * n
-    right, up = 2 * pinhole[2] / columns, 2 * pinhole[3] / rows
+    right, up = 2 * pinhole[2] / columns, 2 * pinhole[3] / (int(pinhole[WHOLE]) * n)
+    above = int(pinhole[TOP]) * n
     turn = pinhole[5:].astype(np.float32)
     across = tiles_across(pinhole)
     place = np.empty(8, np.int64)
@@ -136,7 +139,7 @@ def first_hits(
             # beyond the picture's last column or row the packet is filled with rays that nobody asks for
             x, y = left + lane % TILE_WIDTH, top + lane // TILE_WIDTH
             a = np.float32((x + 0.5) * right - pinhole[2])
-            b = np.float32(pinhole[3] - (y + 0.5) * up)
+            b = np.float32(pinhole[3] - (above + y + 0.5) * up)
             c = np.float32(-1) / np.sqrt(a * a + b * b + np.float32(1))
             a, b = -a * c, -b * c
             packet[DIRECTION, lane] = turn[0] * a + turn[1] * b + turn[2] * c

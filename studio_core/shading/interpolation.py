@@ -163,6 +163,6 @@ def _pixels(mesh: WorldMesh, view: View, ends: I64) -> F64:
     depth = -local[..., 2]
     front = (depth > 1e-6).all(axis=1)
     flat = local[..., :2] / np.maximum(depth, 1e-6)[..., None]
-    unit = view.height / (2 * np.tan(np.radians(view.fov) / 2))
+    unit = view.rows / (2 * np.tan(np.radians(view.fov) / 2))
     length = unit * np.linalg.norm(flat[:, 0] - flat[:, 1], axis=1)
     return np.where(front, length, np.inf)

@@ -311,11 +311,12 @@ def screen_box(
     limit = 4.0  # times the picture: keeps whole numbers small
     left, right = np.clip([(across - wide).min(), (across + wide).max()], -limit, limit)
     bottom, top = np.clip([(up - high_).min(), (up + high_).max()], -limit, limit)
+    down, above = view.rows * view.antialias, view.top * view.antialias
     return (
         int(np.floor((left + 1) / 2 * columns)) - 1,
-        int(np.floor((1 - top) / 2 * rows)) - 1,
+        int(np.floor((1 - top) / 2 * down)) - 1 - above,
         int(np.ceil((right + 1) / 2 * columns)) + 1,
-        int(np.ceil((1 - bottom) / 2 * rows)) + 1,
+        int(np.ceil((1 - bottom) / 2 * down)) + 1 - above,
     )
 
 
@@ -323,8 +324,8 @@ def pinhole(view: View) -> F64:
     """A view as `kernels.camera` wants it."""
     up = np.tan(np.radians(view.fov) / 2)
     rotation = rotation_matrix(view.transform.rotation)
-    size = (view.width, view.antialias, up * view.width / view.height, up, view.height)
-    return np.array([*size, *rotation.ravel()], np.float64)
+    size = (view.width, view.antialias, up * view.width / view.rows, up, view.height)
+    return np.array([*size, *rotation.ravel(), view.top, view.rows], np.float64)
 
 
 def eye_in(surfaces: Surfaces, view: View) -> F64:

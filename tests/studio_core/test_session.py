@@ -97,3 +97,17 @@ def test_framing_shows_the_whole_box(one: object, other: object, width: int, hei
         assert abs(x) <= -z * tangent * width / height * (1 + 1e-6) + 1e-6
     assert view.target == pytest.approx(tuple((low + high) / 2), abs=1e-6 * (1 + view.focus))
     assert view.transform.matrix()[1, 1] > 0  # upright
+
+
+def test_a_part_knows_its_whole() -> None:
+    whole = View(width=8, height=6)
+    part = whole.part(2, 3)
+    assert (part.top, part.height, part.rows, part.width) == (2, 3, 6, 8)
+    assert part.part(4, 2) == whole.part(4, 2)
+    assert whole.rows == 6
+
+
+@pytest.mark.parametrize(("top", "height"), [(4, 3), (-1, 2), (6, 1)])
+def test_a_part_lies_in_the_picture(top: int, height: int) -> None:
+    with pytest.raises(ValueError, match="part"):
+        View(width=8, height=6).part(top, height)

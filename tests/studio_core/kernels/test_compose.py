@@ -71,6 +71,26 @@ def test_background_equals_the_oracle(named, antialias):
         np.testing.assert_allclose(made, expected, atol=5e-5)
 
 
+def test_a_part_has_the_background_of_the_whole_there():
+    rng = np.random.default_rng(3)
+    pixels = rng.random((8, 16, 3)).astype(np.float32)
+    whole = View(looking((0, 0, 0), (1, -2, 0.5)), fov=150, width=21, height=16, antialias=2)
+
+    def behind(view, samples):
+        turn = view.transform.matrix()[:3, :3].astype(np.float32)
+        face, gain = np.full(len(samples), -1, np.int32), np.ones(3, np.float32)
+        out = np.empty((len(samples), 3), np.float32)
+        background_hits(0, len(out), pinhole(view), samples, face, turn, pixels, gain, out)
+        directions = np.empty((len(samples), 3), np.float32)
+        sample_directions(pinhole(view), samples, directions)
+        return out, directions
+
+    every = behind(whole, np.arange(21 * 16 * 4))
+    part = behind(whole.part(6, 5), np.arange(21 * 5 * 4))
+    for made, expected in zip(part, every, strict=True):
+        np.testing.assert_array_equal(made, expected[21 * 6 * 4 : 21 * 11 * 4])
+
+
 def test_samples_are_ordered_by_pixel_and_lie_in_it():
     view = View(looking((0, 1, 2), (0.3, 0, 0)), fov=60, width=4, height=3, antialias=2)
     out = np.empty((4 * 3 * 4, 3), np.float32)

@@ -290,3 +290,24 @@ def test_another_border_between_materials_is_another_edge(host, workers):
     eye.see(scene.with_nodes(dataclasses.replace(scene["floor"], materials=("matt", "paint"))))
     assert len(eye.hits.edges.pixels) > len(alike.edges.pixels)
     assert_same(eye.hits, eye.anew)
+
+
+@pytest.mark.parametrize("antialias", [1, 2, 3])
+def test_a_part_sees_what_the_whole_picture_sees_there(host, workers, little_scene, antialias):
+    eye = Looking(little_scene(), host, workers, width=45, height=30, antialias=antialias)
+    whole = [getattr(eye.hits, name).reshape(30, -1) for name in ARRAYS]
+    for top, height in ((0, 8), (8, 16), (24, 6)):
+        part = eye.see(little_scene(), View.part(eye.view, top, height))
+        for name, expected in zip(ARRAYS, whole, strict=True):
+            seen = getattr(part, name).reshape(height, -1)
+            np.testing.assert_array_equal(seen, expected[top : top + height])
+
+
+@given(st.tuples(*[st.floats(-2, 2)] * 3), st.integers(0, 20), st.integers(1, 10))
+@settings(max_examples=20)
+def test_the_screen_box_in_a_part_is_that_of_the_whole_moved_up(place, top, height):
+    view = View(looking((0.2, 1.0, 6.0), (0, 0, 0)), width=40, height=30, antialias=2)
+    low, high = np.full(3, -0.4), np.full(3, 0.4)
+    left, above, right, below = screen_box(low, high, Transform(place), view, 1e-3)
+    moved = screen_box(low, high, Transform(place), view.part(top, height), 1e-3)
+    assert moved == (left, above - 2 * top, right, below - 2 * top)
