@@ -116,9 +116,10 @@ class Reparent:
 
     def __call__(self, scene: Scene) -> Scene:
         for node_id in self.nodes:
-            if self.parent is not None and self.parent in scene.subtree(node_id):
-                raise EditError("a node cannot hang under itself")
             node = scene[node_id]
+            if self.parent is not None and self.parent in scene.subtree(node_id):
+                under = "itself" if self.parent == node_id else f"{scene[self.parent].name!r}, a part of it"
+                raise EditError(f"{node.name!r} cannot hang under {under}")
             if node.parent == self.parent:
                 continue
             try:

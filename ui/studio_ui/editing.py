@@ -46,6 +46,11 @@ class Editing:
             return False
         return self._try(gesture.label, lambda: gesture.apply(edit))
 
+    def call(self, owner: object, label: str) -> None:
+        """Give the gesture another name: what it does became clear while it lasted."""
+        if self._gesture is not None and self._owner is owner:
+            self._gesture.label = label
+
     def commit(self, owner: object) -> None:
         """End the gesture as one step."""
         if self._gesture is not None and self._owner is owner:

@@ -16,6 +16,7 @@ from studio_ui.ask import Ask
 from studio_ui.canvas.choice import CanvasChoice
 from studio_ui.canvas.switch_viewport import SwitchViewport
 from studio_ui.canvas.tools import CanvasTools
+from studio_ui.choosing import Choosing
 from studio_ui.commands import Commands
 from studio_ui.context import Context
 from studio_ui.dialogs import Dialogs
@@ -67,6 +68,8 @@ class MainWindow(QMainWindow):
         self.following = Following(self, context, viewport, self.status, self.files)
         handlers, conditions = gather(self._features())
         self.actions_ = ActionSet(self, viewport.widget, handlers, conditions, self.following.soon)
+        for panel in self.panels.values():
+            panel.use_actions(self.actions_.actions)
         self.menus = Menus(self.menuBar(), self.actions_, context, self.commands, self.files, settings)
         self.menus.offer_samples(samples or {})
         self.menus.offer_panels(self.docks)
@@ -96,6 +99,7 @@ class MainWindow(QMainWindow):
             self.commands,
             self.appearance,
             self.layout_,
+            Choosing(context),
             Help(self, context.host),
         ]
 

@@ -12,4 +12,8 @@ ITEMS: tuple[Item, ...] = (
     SEPARATOR,
     ActionSpec("edit.select_all", "Select all", "Edit", "Ctrl+A"),
     ActionSpec("edit.select_none", "Select nothing", "Edit", "Ctrl+Shift+A", enabled="selection"),
+    ActionSpec("edit.select_material", "Select same material", "Edit", "",
+               "All objects that share a material with what is chosen", enabled="objects"),
+    ActionSpec("edit.select_instances", "Select instances", "Edit", "",
+               "All objects that share a mesh with what is chosen", enabled="objects"),
 )  # fmt: skip

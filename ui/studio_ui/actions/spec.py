@@ -40,6 +40,7 @@ REASONS = {
     "undo": "Nothing to undo",
     "redo": "Nothing to redo",
     "selection": "Nothing is chosen",
+    "objects": "No object is chosen",
     "movable": "Nothing is chosen that can be moved",
     "camera": "No camera is chosen",
     "group": "No group is chosen",

@@ -32,7 +32,7 @@ from studio_core.scene.transform import Transform, looking, vec3
 from studio_ui.canvas.projection import bounds
 from studio_ui.context import Context
 from studio_ui.icons import icon
-from studio_ui.panels.outliner_model import kind_icon
+from studio_ui.panels.node_kinds import kind_icon
 from studio_ui.panels.panel import Panel, clear, note, row
 from studio_ui.param_form import ParamForm
 from studio_ui.sinks import EditSink

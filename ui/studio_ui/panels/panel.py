@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from PySide6.QtCore import Qt
+from PySide6.QtGui import QAction
 from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QScrollArea, QToolButton, QVBoxLayout, QWidget
 
 from studio_ui.context import Context, Subscriptions
@@ -35,6 +38,9 @@ class Panel(QWidget):
         self.theme = theme
         for button, name in self._icons:
             button.setIcon(icon(name, theme.text, theme.on_accent))
+
+    def use_actions(self, actions: Mapping[str, QAction]) -> None:
+        """The window's actions by id, for panels that offer some of them."""
 
     def tool(self, name: str, tip: str) -> QToolButton:
         """A small button with an icon."""
