@@ -1,13 +1,16 @@
-"""How large a scene is."""
+"""How large a scene is, and the things in it."""
 
 from __future__ import annotations
+
+from collections.abc import Iterable
 
 import numpy as np
 import numpy.typing as npt
 
-from studio_core.scene.nodes import MeshObject, Scene
+from studio_core.scene.nodes import Environment, MeshObject, NodeId, Scene
 
 F64 = npt.NDArray[np.float64]
+_STRAIGHT = 1e-9  # sine of the smallest angle that makes the box of a mesh larger than its mesh
 
 
 def scene_bounds(scene: Scene) -> tuple[F64, F64]:
@@ -25,3 +28,41 @@ def scene_bounds(scene: Scene) -> tuple[F64, F64]:
         return np.array([-0.5, 0.0, -0.5]), np.array([0.5, 1.0, 0.5])
     points = np.concatenate(corners)
     return points.min(axis=0), points.max(axis=0)
+
+
+def exact_bounds(scene: Scene, nodes: Iterable[NodeId]) -> tuple[F64, F64] | None:
+    """Lowest and highest corner, (3,) each, of what is shown at and under `nodes`: around every vertex.
+
+    What has no mesh at or under it counts as a point (lamps, cameras); an environment is nowhere. None when
+    nothing of it is shown.
+    """
+    found: list[F64] = []
+    for node in nodes:
+        if not scene.shown(node):
+            continue
+        boxes = [mesh_box(scene, below) for below in scene.subtree(node) if _has_mesh(scene, below)]
+        if not boxes and not isinstance(scene[node], Environment):
+            boxes = [np.array([scene.world(node).translation] * 2)]
+        found += boxes
+    if not found:
+        return None
+    ends = np.stack(found)
+    return ends[:, 0].min(axis=0), ends[:, 1].max(axis=0)
+
+
+def mesh_box(scene: Scene, node: NodeId) -> F64:
+    """(2, 3) lowest and highest corner of a mesh object in the world; raises TypeError for other nodes."""
+    made = scene[node]
+    if not isinstance(made, MeshObject):
+        raise TypeError(f"{made.name!r} has no mesh")
+    world = scene.world(node).matrix()
+    turn, place = world[:3, :3], world[:3, 3]
+    straight = (np.abs(turn) > _STRAIGHT * np.abs(turn).max()).sum() == 3
+    points = made.geometry.bounds if straight else made.geometry.positions.astype(np.float64)
+    placed = points @ turn.T + place
+    return np.stack([placed.min(axis=0), placed.max(axis=0)])
+
+
+def _has_mesh(scene: Scene, node: NodeId) -> bool:
+    made = scene[node]
+    return isinstance(made, MeshObject) and len(made.geometry.positions) > 0 and scene.shown(node)

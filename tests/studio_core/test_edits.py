@@ -349,3 +349,35 @@ def test_copies_are_numbered_from_the_first_free_name() -> None:
     scene = Scene().with_nodes(Camera(id="a", name="Front"), Camera(id="b", name="Front 2"))
     assert edits.duplicate(scene, ("a",)).nodes[0].name == "Front 3"
     assert edits.duplicate(scene, ("b",)).nodes[0].name == "Front 3"
+
+
+def test_copies_can_have_materials_of_their_own() -> None:
+    plain = edits.duplicate(SCENE, ("outer",))
+    assert plain.materials == ()
+    own = edits.duplicate(SCENE, ("outer", "lamp"), own_materials=True)
+    made = own(SCENE)
+    (chair,) = [n for n in own.nodes if isinstance(n, MeshObject)]
+    (paint,) = own.materials
+    assert chair.materials == (paint.id,)
+    assert chair.geometry is SCENE["chair"].geometry  # type: ignore[attr-defined]
+    assert paint.name not in {m.name for m in SCENE.materials.values()}
+    assert dataclasses.replace(paint, id="paint", name=SCENE.material("paint").name) == SCENE.material("paint")
+    assert made["chair"] is SCENE["chair"]
+
+
+def test_copies_of_several_have_several_names() -> None:
+    two = SCENE.with_nodes(
+        Group(id="a", name="Chair"), Group(id="b", name="Chair"), Group(id="c", name="Chair 2")
+    )
+    names = [node.name for node in edits.duplicate(two, ("a", "b", "c")).nodes]
+    assert names == ["Chair 3", "Chair 4", "Chair 5"]
+
+
+def test_a_material_is_made_its_own_only_where_others_use_it() -> None:
+    other = MeshObject(id="other", name="Other", geometry=cube(), materials=("paint",))
+    both = edits.Add((other,))(SCENE)
+    made = edits.with_own_materials(both, ("outer",))(both)
+    (mine,) = made["chair"].materials  # type: ignore[attr-defined]
+    assert mine != "paint"
+    assert made["other"] is both["other"]
+    assert edits.with_own_materials(made, ("outer",))(made) is made, "nobody else uses it any more"

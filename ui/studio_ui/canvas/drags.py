@@ -5,15 +5,15 @@ All edits are relative to the scene at the press; `Editing.preview` applies them
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
 
 from studio_core.edits import Edit, Move, SetFields
+from studio_core.scene.arranging import shifted, turned
 from studio_core.scene.nodes import Environment, NodeId, Scene
-from studio_core.scene.transform import Transform, axis_angle, vec3
 from studio_core.session import View
 from studio_ui.canvas.projection import axes_of, bounds, eye_of, ray
 from studio_ui.canvas.viewport import Pointer
@@ -33,43 +33,6 @@ class Drag(Protocol):
     def edit(self, pointer: Pointer) -> Edit:
         """What the gesture does with the mouse there."""
         ...
-
-
-def roots(scene: Scene, nodes: Iterable[NodeId]) -> tuple[NodeId, ...]:
-    """Those nodes that can move and do not hang under another one of them."""
-    chosen = [node for node in nodes if node in scene.nodes and not isinstance(scene[node], Environment)]
-    free = [n for n in chosen if not any(above.id in chosen for above in scene.ancestors(n))]
-    return tuple(n for n in free if not is_locked(scene, n))
-
-
-def is_locked(scene: Scene, node: NodeId) -> bool:
-    """Whether the node or one of its parents is locked."""
-    return scene[node].locked or any(parent.locked for parent in scene.ancestors(node))
-
-
-def shifted(scene: Scene, nodes: Iterable[NodeId], delta: npt.ArrayLike) -> dict[NodeId, Transform]:
-    """Local transforms that move nodes by `delta` metres in the world."""
-    by = Transform(vec3(delta))
-    return placed(scene, {node: by @ scene.world(node) for node in nodes})
-
-
-def placed(scene: Scene, worlds: Mapping[NodeId, Transform]) -> dict[NodeId, Transform]:
-    """Local transforms that put nodes at places in the world."""
-    made = {}
-    for node, world in worlds.items():
-        parent = scene[node].parent
-        made[node] = world if parent is None else scene.world(parent).inverse() @ world
-    return made
-
-
-def turned(
-    scene: Scene, nodes: Iterable[NodeId], degrees: float, pivot: npt.ArrayLike
-) -> dict[NodeId, Transform]:
-    """Local transforms that turn nodes about the vertical through `pivot`."""
-    centre = np.asarray(pivot, np.float64)
-    turn = Transform(rotation=axis_angle((0, 1, 0), degrees))
-    about = Transform(vec3(centre)) @ turn @ Transform(vec3(-centre))
-    return placed(scene, {node: about @ scene.world(node) for node in nodes})
 
 
 def named(scene: Scene, nodes: tuple[NodeId, ...], verb: str) -> str:
@@ -157,14 +120,4 @@ def middle(scene: Scene, nodes: Iterable[NodeId]) -> F64:
     """Centre of the box around nodes."""
     found = bounds(scene, nodes)
     made: F64 = (found[0] + found[1]) / 2 if found is not None else np.zeros(3)
-    return made
-
-
-def dropped(scene: Scene, nodes: Iterable[NodeId], floor: float = 0.0) -> dict[NodeId, Transform]:
-    """Local transforms that let each node stand on the floor."""
-    made: dict[NodeId, Transform] = {}
-    for node in nodes:
-        found = bounds(scene, (node,))
-        if found is not None:
-            made |= shifted(scene, (node,), (0.0, floor - found[0][1], 0.0))
     return made

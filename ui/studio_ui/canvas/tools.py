@@ -11,11 +11,12 @@ from collections.abc import Callable
 import numpy as np
 
 from studio_core.document import Document
+from studio_core.scene.arranging import is_locked, roots
 from studio_core.scene.diff import Changes
 from studio_core.scene.nodes import Environment, NodeId, Scene
 from studio_core.session import Session
 from studio_core.signal import Signal
-from studio_ui.canvas.drags import Drag, LightDrag, MoveDrag, TurnDrag, is_locked, roots
+from studio_ui.canvas.drags import Drag, LightDrag, MoveDrag, TurnDrag
 from studio_ui.canvas.glyphs import glyphs
 from studio_ui.canvas.looking import Looking
 from studio_ui.canvas.projection import bounds, box_segments
