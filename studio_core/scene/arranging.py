@@ -56,7 +56,7 @@ def turned(
     pivot: npt.ArrayLike,
     axis: npt.ArrayLike = UP,
 ) -> Placed:
-    """Local transforms that turn nodes about an axis (default: the vertical) through `pivot`, right-handed."""
+    """Local transforms that turn nodes, right-handed, about an axis (the vertical) through `pivot`."""
     return _about(scene, nodes, pivot, Transform(rotation=axis_angle(axis, degrees)))
 
 

@@ -7,20 +7,24 @@ prepared when a mesh is first in question, and kept: a drag asks hundreds of tim
 
 from __future__ import annotations
 
-from collections.abc import Container
+from collections.abc import Container, Iterable
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
-from studio_core.scene.bounds import mesh_box
+from studio_core.edits import Move
+from studio_core.scene.arranging import shifted
+from studio_core.scene.bounds import exact_bounds, mesh_box
 from studio_core.scene.nodes import MeshObject, NodeId, Scene
+from studio_core.scene.transform import Transform
 
 F32 = npt.NDArray[np.float32]
 F64 = npt.NDArray[np.float64]
 LEVEL = 0.7
 """Cosine of the steepest slope that something stands on."""
 DOWN = np.array([0.0, -1.0, 0.0])
+_NEAR = 1e-6  # metres: what lies this much above still counts as below
 _INSET = 0.04  # of a footprint's width: points lie within its edge
 _EDGE = 1e-7  # barycentric: rays along the edge between two triangles hit
 
@@ -126,9 +130,9 @@ class Ground:
             return found
         low, high = asked.min(axis=0), asked.max(axis=0)
         for mesh in self._meshes:
-            if (mesh.low[[0, 2]] <= high[[0, 2]]).all() and (mesh.high[[0, 2]] >= low[[0, 2]]).all():
-                if mesh.low[1] <= high[1] + 1e-9 and mesh.high[1] > found.min():
-                    found = np.maximum(found, mesh.below(asked))
+            over = (mesh.low[[0, 2]] <= high[[0, 2]]).all() and (mesh.high[[0, 2]] >= low[[0, 2]]).all()
+            if over and mesh.low[1] <= high[1] + 1e-9 and mesh.high[1] > found.min():
+                found = np.maximum(found, mesh.below(asked))
         return found
 
     def support(self, low: npt.ArrayLike, high: npt.ArrayLike, top: float) -> float:
@@ -154,6 +158,25 @@ class Ground:
             if hit is not None and hit[0] < best:
                 best, found = hit[0], Seat(hit[1], mesh.id)
         return found
+
+
+def dropped(scene: Scene, nodes: Iterable[NodeId]) -> dict[NodeId, Transform]:
+    """Local transforms that let each of `nodes` stand on what lies below it, else on the floor at y = 0.
+
+    They stand on each other too, the lowest first. What is sunk into something by less than half of its
+    height comes up.
+    """
+    found = {node: exact_bounds(scene, (node,)) for node in nodes}
+    made: dict[NodeId, Transform] = {}
+    for node, box in sorted(found.items(), key=lambda item: item[1][0][1] if item[1] is not None else 0.0):
+        if box is None:
+            continue
+        low, high = box
+        height = Ground(scene, {node}).support(low, high, float(low[1] + high[1]) / 2 + _NEAR)
+        moved = shifted(scene, (node,), (0.0, (height if np.isfinite(height) else 0.0) - low[1], 0.0))
+        scene = Move(moved)(scene)
+        made |= moved
+    return made
 
 
 def _boxes(faces: npt.NDArray[np.uint32], x: F32, y: F32) -> F32:

@@ -361,7 +361,9 @@ def test_copies_can_have_materials_of_their_own() -> None:
     assert chair.materials == (paint.id,)
     assert chair.geometry is SCENE["chair"].geometry  # type: ignore[attr-defined]
     assert paint.name not in {m.name for m in SCENE.materials.values()}
-    assert dataclasses.replace(paint, id="paint", name=SCENE.material("paint").name) == SCENE.material("paint")
+    assert dataclasses.replace(paint, id="paint", name=SCENE.material("paint").name) == SCENE.material(
+        "paint"
+    )
     assert made["chair"] is SCENE["chair"]
 
 

@@ -14,15 +14,16 @@ from pytestqt.qtbot import QtBot
 from ui_support import room
 
 from studio_core.document import Document
-from studio_core.edits import SetFields
+from studio_core.edits import Move, SetFields
 from studio_core.errors import Cancelled, InputError
 from studio_core.params import ParamInfo
+from studio_core.scene.arranging import placed, roots, shifted, turned
+from studio_core.scene.standing import dropped
 from studio_core.scene.transform import Transform, axis_angle, looking, multiply, rotation_matrix
 from studio_core.session import View
 from studio_core.shading.scheduler import ComputeThread, InlineExecutor
 from studio_ui.bridge import Bridge
 from studio_ui.canvas import navigation
-from studio_ui.canvas.drags import dropped, placed, roots, shifted, turned
 from studio_ui.canvas.projection import axes_of, bounds, eye_of, project, project_segments, ray
 from studio_ui.editing import Editing
 from studio_ui.euler import from_euler, to_euler
@@ -163,8 +164,10 @@ def test_roots_leave_out_what_hangs_under_another_and_what_is_locked() -> None:
 
 def test_dropping_stands_things_on_the_floor() -> None:
     scene = room()
+    lifted = Move({"stool": Transform((1.0, 1.7, 0.0))})(scene)
+    assert dropped(lifted, ["stool"])["stool"].translation == pytest.approx((1.0, 0.0, 0.0))
     made = dropped(scene, ["back"])["back"]
-    assert (scene.world("chair") @ made).translation[1] == pytest.approx(0)
+    assert (scene.world("chair") @ made).translation[1] == pytest.approx(1.0), "on the seat"
 
 
 def test_sliders_span_what_a_hand_can_use() -> None:

@@ -8,11 +8,13 @@ from functools import partial
 import numpy as np
 
 from studio_core.edits import Add, Compound, Edit, Move, Remove, Reparent, SetFields, duplicate
+from studio_core.scene.arranging import is_locked, roots, shifted, turned
 from studio_core.scene.nodes import Camera, Environment, Group, NodeId, Scene, new_id
+from studio_core.scene.standing import dropped
 from studio_core.scene.transform import Transform, vec3
 from studio_core.session import View
 from studio_ui.canvas import navigation
-from studio_ui.canvas.drags import dropped, is_locked, middle, named, roots, shifted, turned
+from studio_ui.canvas.drags import middle, named
 from studio_ui.canvas.projection import bounds
 from studio_ui.canvas.tools import TOOLS, CanvasTools
 from studio_ui.context import Context

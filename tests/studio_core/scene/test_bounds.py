@@ -14,7 +14,7 @@ from studio_core.scene.nodes import Group, MeshObject, PointLamp, Scene
 from studio_core.scene.transform import Transform, axis_angle, vec3
 
 
-def scene(transform: Transform = Transform()) -> Scene:
+def scene(transform: Transform) -> Scene:
     nodes = (
         Group(id="group", name="Group", transform=transform),
         MeshObject(id="box", name="Box", parent="group", geometry=cube(2.0), materials=("paint",)),
@@ -24,7 +24,9 @@ def scene(transform: Transform = Transform()) -> Scene:
 
 
 @given(st.floats(-180, 180), st.sampled_from([(1, 0, 0), (0, 1, 0), (1, 2, 3)]), st.floats(0.1, 5))
-def test_a_box_touches_the_outermost_vertices(degrees: float, axis: tuple[int, int, int], size: float) -> None:
+def test_a_box_touches_the_outermost_vertices(
+    degrees: float, axis: tuple[int, int, int], size: float
+) -> None:
     made = scene(Transform(vec3((1, 2, 3)), axis_angle(axis, degrees), size))
     matrix = made.world("box").matrix()
     points = cube(2.0).positions @ matrix[:3, :3].T + matrix[:3, 3]

@@ -9,10 +9,11 @@ from hypothesis import strategies as st
 from oracles.standing import first_level, height_below
 from scenes import cube, floor, little_scene
 
-from studio_core.edits import Add
+from studio_core.edits import Add, Move
+from studio_core.scene.bounds import exact_bounds
 from studio_core.scene.geometry import Geometry
 from studio_core.scene.nodes import MeshObject, Scene
-from studio_core.scene.standing import Ground
+from studio_core.scene.standing import Ground, dropped
 from studio_core.scene.transform import Transform, axis_angle
 
 EMPTY = Add(())(little_scene())
@@ -61,6 +62,24 @@ def test_a_falling_ray_meets_the_first_level_surface() -> None:
 def test_what_is_hidden_carries_nothing() -> None:
     made = scene(("floor", floor(6.0), Transform()), ("table", cube(), TABLE), hidden=("table",))
     assert Ground(made).below([(1, 2, 0)])[0] == 0.0
+
+
+@given(st.floats(1.1, 4.0), st.floats(-180, 180), st.floats(0.0, 1.0))
+def test_what_is_dropped_touches_what_lies_below(height: float, degrees: float, x: float) -> None:
+    turned = Transform((x, height, 0.0), axis_angle((1, 1, 0.3), degrees), 0.3)
+    made = Add(tuple(scene(("vase", cube(), turned)).nodes.values()))(ROOM)
+    low, high = exact_bounds(Move(dropped(made, ("vase",)))(made), ("vase",)) or ((), ())
+    carried = 1.0 if x + (high[0] - low[0]) * 0.46 > 0.5 else 0.0
+    assert low[1] == pytest.approx(carried, abs=1e-6)
+
+
+def test_what_is_dropped_together_stays_a_stack() -> None:
+    meshes = (("low", cube(), Transform((0, 2.0, 0))), ("high", cube(), Transform((0.1, 3.5, 0))))
+    made = Add(tuple(scene(*meshes).nodes.values()))(ROOM)
+    after = Move(dropped(made, ("high", "low")))(made)
+    assert [after.world(n).translation[1] for n in ("low", "high")] == pytest.approx([0.5, 1.5])
+    alone = Move(dropped(scene(*meshes), ("low",)))(made)
+    assert alone.world("low").translation[1] == pytest.approx(0.5), "a floor without a mesh"
 
 
 triangles = st.integers(0, 2**32).map(np.random.default_rng)

@@ -1,4 +1,4 @@
-"""Gizmos: the handles that a selection is moved, turned and scaled with. Their shape, and what the mouse is on.
+"""Gizmos: the handles that a selection is moved, turned and scaled with: their shape, what the mouse is on.
 
 They are as large on the screen from near and far. An axis that points at the eye, and a plane or ring seen
 edge-on, fade and cannot be grabbed: a hand could not say what it means there. No toolkit here.
@@ -77,7 +77,7 @@ def metres_per_pixel(view: View, height: float, point: npt.ArrayLike) -> float:
 
 
 class Gizmo:
-    """The handles of a tool (`move`, `rotate`, `scale`) as one view sees them on a canvas of `size` pixels."""
+    """The handles of a tool (`move`, `rotate`, `scale`) as a view sees them on `size` logical pixels."""
 
     def __init__(self, tool: str, frame: Frame, view: View, size: tuple[float, float]) -> None:
         self.tool, self.frame, self._view, self._size = tool, frame, view, size

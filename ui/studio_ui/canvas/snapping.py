@@ -187,7 +187,7 @@ def _others(scene: Scene, moving: Sequence[NodeId], box: F64) -> list[tuple[Node
 
 
 def _guide(met: Met, moved: F64, other: F64, name: str, words: object) -> list[Mark]:
-    """In the plane that was met: from the nearest side of one box to that of the other, and around the other."""
+    """In the plane that was met: from one box to the other, and around the other."""
     assert callable(words)
     start, end = np.zeros(3), np.zeros(3)
     gap = 0.0
@@ -206,7 +206,11 @@ def _guide(met: Met, moved: F64, other: F64, name: str, words: object) -> list[M
             gap = max(gap, float(end[axis] - start[axis]))
     marks: list[Mark] = [Wires(_side(other, met.axis, met.at), _GUIDE, 1.0, bare=True)]
     if gap > 1e-3:
-        marks += [Wires(np.array([[start, end]]), _GUIDE, 1.5), Dot(start, _GUIDE, 2.5), Dot(end, _GUIDE, 2.5)]
+        marks += [
+            Wires(np.array([[start, end]]), _GUIDE, 1.5),
+            Dot(start, _GUIDE, 2.5),
+            Dot(end, _GUIDE, 2.5),
+        ]
         marks.append(Label((start + end) / 2, f"{name} · {words(gap)}", _GUIDE, (8.0, 6.0)))
     else:
         marks.append(Label(start, name, _GUIDE, (8.0, 6.0)))
