@@ -167,7 +167,13 @@ class SetGeometry:
     label: str = "Replace mesh"
 
     def __call__(self, scene: Scene) -> Scene:
-        made = dataclasses.replace(_mesh(scene, self.node), geometry=self.geometry)
+        node = _mesh(scene, self.node)
+        try:
+            made = dataclasses.replace(node, geometry=self.geometry)
+        except ValueError:  # a field that follows from others
+            raise EditError(
+                f"{node.name!r} cannot have another mesh: its own follows from its sizes"
+            ) from None
         made_scene = scene.with_nodes(made)
         _check_node(made_scene, made)
         return made_scene
@@ -355,7 +361,10 @@ def _with_fields(thing: Any, values: Mapping[str, Any]) -> Any:
             checked[name] = check(name, infos[name], value) if name in infos else _other(name, value)
         except InputError as error:
             raise EditError(str(error)) from None
-    return dataclasses.replace(thing, **checked)
+    try:
+        return dataclasses.replace(thing, **checked)
+    except (ValueError, TypeError) as error:
+        raise EditError(f"{thing.name!r} cannot be like that: {error}") from None
 
 
 _SCALE = ParamInfo("number", "Calibration", low=1e-12, high=1e12)

@@ -27,12 +27,17 @@ from studio_core.scene.nodes import (
     Scene,
     SpotLamp,
 )
+from studio_core.scene.room import SLOTS, Room
+from studio_core.scene.room_shape import Opening
 from studio_core.scene.transform import Transform, axis_angle
 
 GEOMETRIES = (floor(), cube(), cube(0.3))
 IMAGES = (sky(8), sky(8, 3.0))
 MODELS = ("lambert", "phong", "ggx")
-KINDS = (Group, MeshObject, MeshObject, Camera, Environment, PointLamp, SpotLamp, DirectionalLamp, AreaLamp)
+KINDS = (
+    *(Group, MeshObject, MeshObject, Room, Camera),
+    *(Environment, PointLamp, SpotLamp, DirectionalLamp, AreaLamp),
+)
 CROWD = 24  # nodes from which on removing gets likely
 
 
@@ -84,6 +89,8 @@ class Dice:
         kind = self.rng.choice(KINDS)
         if kind is MeshObject:
             return MeshObject(**base, geometry=self.rng.choice(GEOMETRIES), materials=(self.material(),))
+        if kind is Room:
+            return Room(**base, materials=(self.material(),) * len(SLOTS), width=self.rng.uniform(2, 6))
         if kind is Environment:
             return Environment(**base, image=self.rng.choice(IMAGES))
         made: Node = kind(**base)
@@ -114,6 +121,11 @@ class Dice:
             choices["background"] = rng.random() < 0.5
         if isinstance(node, SpotLamp):
             choices["cone"] = rng.uniform(1, 90)
+        if isinstance(node, Room):
+            choices["width"] = rng.uniform(0.4, 8)  # now and then too narrow
+            choices["ceiling"] = rng.random() < 0.5
+            choices["without"] = rng.choice(((), (1,), (2, 3), (7,)))
+            choices["openings"] = rng.choice(((), (Opening(),), (Opening(wall=1, along=1.0),), ("none",)))
         if isinstance(node, AreaLamp):
             choices["width"] = rng.uniform(0.1, 3)
         return {name: choices[name] for name in rng.sample(sorted(choices), rng.randint(1, 2))}

@@ -21,10 +21,12 @@ from studio_core.project.memo import Memo
 from studio_core.scene import nodes
 from studio_core.scene.geometry import Geometry, Image
 from studio_core.scene.nodes import Material, Node, Scene
+from studio_core.scene.room import Room
 
 TAGS: Mapping[str, type[Any]] = {
     "group": nodes.Group,
     "mesh": nodes.MeshObject,
+    "room": Room,
     "camera": nodes.Camera,
     "environment": nodes.Environment,
     "point_lamp": nodes.PointLamp,

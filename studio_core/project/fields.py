@@ -175,20 +175,20 @@ def mapping(inner: Codec) -> Codec:
 class Record:
     """The codec of a dataclass: every field by name, nothing else.
 
-    A missing field takes its default (files of this format from before the field was added); an unknown
-    one is refused, for leaving it out would lose what a newer program saved. A number out of its
-    parameter's range is brought into it: the project opens, and kernels get what they are made for.
+    Fields that follow from others (`init=False`) are made again when it is read. A missing field takes its
+    default (files of this format from before the field was added); an unknown one is refused, for leaving
+    it out would lose what a newer program saved. A number out of its parameter's range is brought into it:
+    the project opens, and kernels get what they are made for.
     """
 
     def __init__(self, cls: type[Any]) -> None:
         hints = get_type_hints(cls)
         self.cls = cls
-        self.fields = {f.name: codec_for(hints[f.name]) for f in dataclasses.fields(cls)}
+        kept = [f for f in dataclasses.fields(cls) if f.init]
+        self.fields = {f.name: codec_for(hints[f.name]) for f in kept}
         missing = dataclasses.MISSING
         self.ranges = param_infos(cls)
-        self.needed = {
-            f.name for f in dataclasses.fields(cls) if f.default is missing and f.default_factory is missing
-        }
+        self.needed = {f.name for f in kept if f.default is missing and f.default_factory is missing}
 
     def write(self, value: Any, heavy: Any, part: str) -> dict[str, Any]:
         """JSON object of an instance."""

@@ -6,7 +6,7 @@ Edits declare nothing: undo, redo and reopening invalidate exactly as the edit i
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from enum import Flag, auto
 
 from studio_core.arrays import frozen_map
@@ -21,6 +21,7 @@ from studio_core.scene.nodes import (
     NodeId,
     Scene,
 )
+from studio_core.scene.room import Room
 
 
 class Aspect(Flag):
@@ -46,6 +47,7 @@ class Aspect(Flag):
 EVERYTHING = ~Aspect.NONE
 _GAIN_FIELDS = ("intensity", "tint", "temperature", "background")
 _NAME_FIELDS = ("name", "locked")
+_MADE_FROM = {f.name for f in fields(Room)} - {f.name for f in fields(MeshObject)}  # the mesh tells
 
 
 @dataclass(frozen=True)
@@ -150,7 +152,7 @@ def _node_diff(old: Node, new: Node) -> Aspect:
     }
     aspect = Aspect.NONE
     for name in changed:
-        if name in _NAME_FIELDS:
+        if name in _NAME_FIELDS or (name in _MADE_FROM and isinstance(new, Room)):
             aspect |= Aspect.NAME
         elif name == "hidden":
             aspect |= _added(new)

@@ -23,6 +23,8 @@ from studio_core.scene.nodes import (
     Scene,
     SpotLamp,
 )
+from studio_core.scene.room import Room
+from studio_core.scene.room_shape import Opening
 from studio_core.scene.transform import Transform
 
 FLOATS = st.floats(allow_nan=False, allow_infinity=False)
@@ -123,6 +125,14 @@ def scenes(draw: st.DrawFn) -> Scene:
                         SpotLamp(**base, **lit),
                         DirectionalLamp(**base, **lit),
                         AreaLamp(**base, **lit, width=draw(st.floats(1e-3, 1e3))),
+                        Room(
+                            **base,
+                            materials=("material-1", "material-0", "material-2", "material-0", "material-1"),
+                            width=draw(st.floats(2, 20)),
+                            ceiling=draw(st.booleans()),
+                            without=draw(st.sampled_from([(), (2,), (0, 1)])),
+                            openings=draw(st.sampled_from([(), (Opening(along=0.5), Opening(wall=1))])),
+                        ),
                     ]
                 )
             )
