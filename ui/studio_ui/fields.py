@@ -8,10 +8,8 @@ from typing import Any
 from PySide6.QtCore import QSignalBlocker, Qt
 from PySide6.QtGui import QWheelEvent
 from PySide6.QtWidgets import (
-    QAbstractSpinBox,
     QCheckBox,
     QComboBox,
-    QDoubleSpinBox,
     QHBoxLayout,
     QLineEdit,
     QSizePolicy,
@@ -22,44 +20,10 @@ from PySide6.QtWidgets import (
 from studio_core.params import ParamInfo
 from studio_ui.colour_button import ColourButton
 from studio_ui.sinks import Sink
+from studio_ui.spin import Spin
 from studio_ui.theme import GAP
 
 _STEPS = 1000
-_WIDEST = 1e9
-
-
-class Spin(QDoubleSpinBox):
-    """A number field that leaves the wheel to the panel until it is clicked."""
-
-    def __init__(self, info: ParamInfo | None = None, *, decimals: int = 3) -> None:
-        super().__init__()
-        info = info or ParamInfo("number", "")
-        whole = info.kind == "integer"
-        self.setDecimals(0 if whole else decimals)
-        self.setRange(max(info.low, -_WIDEST), min(info.high, _WIDEST))
-        self.setSuffix(f" {info.unit}" if info.unit else "")
-        self.setKeyboardTracking(False)
-        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
-        self.setAlignment(Qt.AlignmentFlag.AlignRight)
-        self.setStepType(
-            QAbstractSpinBox.StepType.AdaptiveDecimalStepType
-            if info.scale == "log" or whole
-            else QAbstractSpinBox.StepType.DefaultStepType
-        )
-        self.setSingleStep(1 if info.unit == "°" or whole else 0.01)
-        self.setMinimumWidth(58)
-
-    def textFromValue(self, value: float) -> str:
-        """Without trailing zeros."""
-        text = f"{value:.{self.decimals()}f}"
-        return text.rstrip("0").rstrip(".") if "." in text else text
-
-    def wheelEvent(self, event: QWheelEvent) -> None:
-        """Only while it has the focus."""
-        if self.hasFocus():
-            super().wheelEvent(event)
-        else:
-            event.ignore()
 
 
 class Combo(QComboBox):
@@ -115,6 +79,7 @@ class NumberField(Field):
             self.slider = Slider(Qt.Orientation.Horizontal)
             self.slider.setRange(0, _STEPS)
             self.slider.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+            self.slider.setAccessibleName(info.label)
             self.slider.sliderPressed.connect(self._pressed)
             self.slider.sliderReleased.connect(self._released)
             self.slider.valueChanged.connect(self._slid)
@@ -122,6 +87,9 @@ class NumberField(Field):
             self.spin.setFixedWidth(76)
         self.row.addWidget(self.spin, 0 if self.slider else 1)
         self.spin.valueChanged.connect(self._typed)
+        self.spin.held.connect(self._pressed)
+        self.spin.let_go.connect(self._released)
+        self.spin.dropped.connect(self._dropped)
 
     def show_value(self, value: Any) -> None:
         """What the scene has."""
@@ -166,10 +134,20 @@ class NumberField(Field):
             self._gesture = False
             self.sink.commit()
 
+    def _dropped(self) -> None:
+        if self._gesture:
+            self._gesture = False
+            self.sink.cancel()
+
     def _typed(self, value: float) -> None:
-        if abs(value - self._value) >= 0.5 * 10.0 ** -self.spin.decimals():  # what is shown is rounded
-            self._value = value
-            self.sink.apply(self.name, round(value) if self.info.kind == "integer" else value)
+        if abs(value - self._value) < 0.5 * 10.0 ** -self.spin.decimals():
+            return  # only rounded
+        self._value = value
+        given = round(value) if self.info.kind == "integer" else value
+        if self._gesture:
+            self.sink.preview(self.name, given)
+        else:
+            self.sink.apply(self.name, given)
 
 
 class FlagField(Field):
@@ -178,6 +156,7 @@ class FlagField(Field):
     def __init__(self, name: str, info: ParamInfo, sink: Sink) -> None:
         super().__init__(name, info, sink)
         self.box = QCheckBox()
+        self.box.setAccessibleName(info.label)
         self.row.addWidget(self.box)
         self.row.addStretch(1)
         self.box.toggled.connect(lambda on: self.sink.apply(self.name, on))
@@ -194,6 +173,7 @@ class ChoiceField(Field):
     def __init__(self, name: str, info: ParamInfo, sink: Sink) -> None:
         super().__init__(name, info, sink)
         self.combo = Combo()
+        self.combo.setAccessibleName(info.label)
         self.combo.addItems(list(info.choices))
         self.row.addWidget(self.combo, 1)
         self.combo.activated.connect(lambda i: self.sink.apply(self.name, self.info.choices[i]))
@@ -210,6 +190,7 @@ class TextField(Field):
     def __init__(self, name: str, info: ParamInfo, sink: Sink) -> None:
         super().__init__(name, info, sink)
         self.edit = QLineEdit()
+        self.edit.setAccessibleName(info.label)
         self.row.addWidget(self.edit, 1)
         self._value = ""
         self.edit.editingFinished.connect(self._typed)

@@ -9,8 +9,9 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QFormLayout, QLabel, QToolButton, QWidget
 
 from studio_core.params import ParamInfo
-from studio_ui.fields import FIELDS, Field, tip
+from studio_ui.fields import FIELDS, Field, NumberField, tip
 from studio_ui.sinks import Sink
+from studio_ui.spin import ScrubLabel
 from studio_ui.theme import GAP
 
 _LABEL = 92  # pixels
@@ -50,7 +51,7 @@ class ParamForm(QWidget):
 
     def _add(self, layout: QFormLayout, name: str, info: ParamInfo, sink: Sink) -> None:
         self.fields[name] = field = FIELDS[info.kind](name, info, sink)
-        layout.addRow(form_label(info.label, tip(info)), field)
+        layout.addRow(form_label(info.label, tip(info), field), field)
 
     def show_values(self, values: Mapping[str, Any]) -> None:
         """What the scene has now; names without a field are left alone."""
@@ -90,9 +91,9 @@ def form_layout(parent: QWidget) -> QFormLayout:
     return layout
 
 
-def form_label(text: str, tool_tip: str = "") -> QLabel:
-    """A row's label: all as wide, so that forms line up."""
-    label = QLabel(text)
+def form_label(text: str, tool_tip: str = "", field: QWidget | None = None) -> QLabel:
+    """A row's label: all as wide, so that forms line up; that of a number can be dragged."""
+    label = ScrubLabel(text, field.spin) if isinstance(field, NumberField) else QLabel(text)
     label.setProperty("role", "dim")
     label.setFixedWidth(_LABEL)
     label.setMinimumHeight(26)
