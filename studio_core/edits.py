@@ -238,13 +238,14 @@ class SetMaterial:
     model: str | None = None
     name: str | None = None
     opacity: float | None = None
+    catches: bool | None = None
     label: str = "Change material"
 
     def __call__(self, scene: Scene) -> Scene:
         old = scene.material(self.material)
         keep = self.model is None or self.model == old.model
         values = {**old.values, **self.values} if keep else dict(self.values)
-        fields = {"name": self.name, "opacity": self.opacity}
+        fields = {"name": self.name, "opacity": self.opacity, "catches": self.catches}
         made = dataclasses.replace(old, model=self.model or old.model, values=frozen_map(values))
         return scene.with_materials(_with_fields(made, {k: v for k, v in fields.items() if v is not None}))
 

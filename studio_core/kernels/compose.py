@@ -318,6 +318,29 @@ def add_samples(samples: I64, count: int, weight: F32, values: F32, out: F32) ->
 
 
 @kernel
+def caught_light(
+    start: int,
+    stop: int,
+    rows: I64,
+    face: I32,
+    u: F32,
+    v: F32,
+    shown: U32,
+    record: F32,
+    photograph: F32,
+    out: F32,
+) -> None:
+    """out (N, 3) of hits rows[start:stop]: photograph (N, 3) times record[:, 3:6] between the corners."""
+    for n in range(start, stop):
+        hit = rows[n]
+        f = face[hit]
+        i, j, k = shown[f, 0], shown[f, 1], shown[f, 2]
+        for c in range(3):
+            light = mix(record[i, 3 + c], record[j, 3 + c], record[k, 3 + c], u[hit], v[hit])
+            out[n, c] = light * photograph[n, c]
+
+
+@kernel
 def outline_pixels(
     start: int,
     stop: int,

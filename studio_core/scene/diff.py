@@ -45,7 +45,8 @@ class Aspect(Flag):
 
 
 EVERYTHING = ~Aspect.NONE
-_GAIN_FIELDS = ("intensity", "tint", "temperature", "background")
+_SEEN_FIELDS = ("background", "background_azimuth", "projection", "ground_height", "ground_radius")
+_GAIN_FIELDS = ("intensity", "tint", "temperature", *_SEEN_FIELDS)
 _NAME_FIELDS = ("name", "locked")
 _MADE_FROM = {f.name for f in fields(Room)} - {f.name for f in fields(MeshObject)}  # the mesh tells
 

@@ -21,6 +21,7 @@ from studio_core.scene.transform import IDENTITY, Transform, axis_angle, multipl
 NodeId = str
 MaterialId = str
 WHITE: Colour = (1.0, 1.0, 1.0)
+FAR_AWAY, ON_THE_GROUND = "far away", "on the ground"
 
 
 def new_id(prefix: str) -> str:
@@ -33,7 +34,8 @@ class Material:
     """A BRDF of the registry by name, its parameters, and textures by parameter name.
 
     Values that are not given have the model's defaults. Under `opacity` 0.5 the surface casts no shadow;
-    under 1 it is drawn blended.
+    under 1 it is drawn blended. What `catches` shadows belongs to the photographed room: it shows what is
+    behind it, times the light it gets over the light it would get if nothing stood there.
     """
 
     id: MaterialId
@@ -42,11 +44,14 @@ class Material:
     values: Mapping[str, Value] = field(default_factory=frozen_map)
     textures: Mapping[str, Texture] = field(default_factory=frozen_map)
     opacity: float = param(1.0, "Opacity", "Below 0.5 the surface casts no shadow", low=0.0, high=1.0)
+    catches: bool = param(
+        False, "Catches shadows", "Shows the background, darker where furniture takes light away from it"
+    )
 
     @property
     def casts_shadow(self) -> bool:
         """Whether light is stopped."""
-        return self.opacity >= 0.5
+        return self.opacity >= 0.5 and not self.catches
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -109,7 +114,9 @@ class Environment(Light):
     """Light from all around: an equirectangular picture of radiance (OpenEXR's lat-long convention).
 
     The picture is tilted about x, then turned about y. `luminance_scale` is cd/m² for one unit of
-    luminance, once calibrated.
+    luminance, once calibrated. As a background it may be turned further, and projected on a ground: then it
+    was photographed `ground_height` above the node's own place, and what is seen lies on the ground as far as
+    `ground_radius`, beyond that on a dome.
     """
 
     image: Image
@@ -118,12 +125,37 @@ class Environment(Light):
     )
     tilt: float = param(0.0, "Tilt", "Tips the light about the horizontal", unit="°", low=-180.0, high=180.0)
     background: bool = param(True, "Visible", "Shown behind the furniture")
+    background_azimuth: float = param(
+        0.0, "Background turned", "Turns what is seen, not the light", unit="°", low=-3600.0, high=3600.0
+    )
+    projection: str = param(
+        FAR_AWAY,
+        "Background",
+        "Far away it never comes nearer; on the ground, furniture stands in it",
+        choices=(FAR_AWAY, ON_THE_GROUND),
+    )
+    ground_height: float = param(
+        1.6, "Camera height", "How high above the floor it was photographed", unit="m", low=0.05, high=1e3
+    )
+    ground_radius: float = param(
+        6.0,
+        "Ground radius",
+        "How far the photographed floor reaches before its walls begin",
+        unit="m",
+        low=0.5,
+        high=1e4,
+    )
     luminance_scale: float | None = None
 
     def rotation(self) -> Transform:
         """World from the picture's own frame."""
         turn, tip = axis_angle((0, 1, 0), self.azimuth), axis_angle((1, 0, 0), self.tilt)
         return Transform(rotation=multiply(turn, tip))
+
+    def background_rotation(self) -> Transform:
+        """World from the frame of the picture that is seen."""
+        turn = axis_angle((0, 1, 0), self.background_azimuth)
+        return Transform(rotation=multiply(turn, self.rotation().rotation))
 
 
 @dataclass(frozen=True, kw_only=True)

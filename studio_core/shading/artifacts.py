@@ -53,15 +53,17 @@ class ChosenPoints:
 class Surfaces:
     """What is lit: the shading meshes of all shown objects in the world, made from `sources`.
 
-    `mesh.material` indexes `materials`; `opacity` is per material; `budget` is how many vertices were
-    asked for. Where light needed it, objects of `mesh` are refined: their vertices and those of `base`, the
-    same without refinement, begin alike, and `tree` leads from faces of `base.mesh` to those of `mesh`.
+    `mesh.material` indexes `materials`; `opacity` is per material, and so is whether it `catches` shadows;
+    `budget` is how many vertices were asked for. Where light needed it, objects of `mesh` are refined: their
+    vertices and those of `base`, the same without refinement, begin alike, and `tree` leads from faces of
+    `base.mesh` to those of `mesh`.
     """
 
     sources: tuple[Source, ...]
     materials: tuple[MaterialId, ...]
     mesh: WorldMesh
     opacity: F32
+    catches: npt.NDArray[np.bool_]
     budget: int
     base: Surfaces | None = None
     tree: FaceTree | None = None
@@ -221,16 +223,29 @@ class Radiance:
         return made
 
 
+@dataclass(frozen=True)
+class Ground:
+    """Where a picture lies on the ground: a disc and a dome over it, both about `centre` (x, y, z), world.
+
+    It was taken `height` above the centre; the disc reaches as far as `radius`, where the dome begins.
+    """
+
+    centre: tuple[float, float, float]
+    height: float
+    radius: float
+
+
 @dataclass(frozen=True, eq=False)
 class Backdrop:
     """What is seen beside objects: an equirectangular picture (H, W, 3), times `gain` (3,).
 
-    `turn` (3, 3) leads from the world to the picture's own frame.
+    `turn` (3, 3) leads from the world to the picture's own frame. Without a `ground` it is far away.
     """
 
     pixels: F32
     turn: F32
     gain: F32
+    ground: Ground | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -238,8 +253,9 @@ class VertexColours:
     """What a picture interpolates, for canvases that do so themselves.
 
     record (V, 8), sums (V or 0, TERMS·3) and maps as in `kernels.compose.shade_hits`; they hold where
-    `Radiance.valid`. `shown` (V,) are the corners of what the picture shows; others may be turned away from
-    its eye, and black. `backdrop` is None where none is seen.
+    `Radiance.valid`. What catches shadows is black there, and has in record[:, 3:6] what the backdrop without
+    gain is multiplied with. `shown` (V,) are the corners of what the picture shows; others may be turned away
+    from its eye, and black. `backdrop` is None where none is seen.
     """
 
     record: F32
@@ -306,6 +322,7 @@ __all__ = [
     "ChosenPoints",
     "EdgeHits",
     "Error",
+    "Ground",
     "Hits",
     "Lamp",
     "LayerRadiance",

@@ -74,6 +74,8 @@ class ErrorMeter:
     ) -> MeasuredError | None:
         """Errors of the pipeline's radiance for `frame`; None where nothing opaque is seen.
 
+        Nor is what catches shadows looked at: it shows a photograph.
+
         Layers that brute force does not make (light that came by way of other surfaces) are left out on
         both sides. With more `places` the errors are surer: their standard error says how sure.
         """
@@ -90,7 +92,8 @@ class ErrorMeter:
         rng = np.random.default_rng(frame.revision)
         surfaces, mesh = radiance.surfaces, radiance.surfaces.mesh
         hit = np.flatnonzero(hits.face >= 0)
-        candidates = hit[surfaces.opacity[mesh.face_material[hits.face[hit]]] >= 1]
+        plain = (surfaces.opacity >= 1) & ~surfaces.catches
+        candidates = hit[plain[mesh.face_material[hits.face[hit]]]]
         if not len(candidates):
             return None
         chosen = np.sort(rng.choice(candidates, min(places, len(candidates)), replace=False))

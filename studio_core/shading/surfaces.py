@@ -60,11 +60,12 @@ class SurfaceStage:
         old: Surfaces | None = inputs.previous
         if old is None or old.budget != budget or old.sources != sources:
             return self._build(scene, sources, budget)
-        opacity = _opacity(scene, old.materials)
+        opacity, catches = _opacity(scene, old.materials), _catches(scene, old.materials)
         mesh = old.mesh.moved_many({i: scene.world(node) for i, node in enumerate(old.nodes)})
-        if mesh is old.mesh and np.array_equal(opacity, old.opacity):
+        same = np.array_equal(opacity, old.opacity) and np.array_equal(catches, old.catches)
+        if mesh is old.mesh and same:
             return old
-        return dataclasses.replace(old, mesh=mesh, opacity=opacity)
+        return dataclasses.replace(old, mesh=mesh, opacity=opacity, catches=catches)
 
     def _build(self, scene: Scene, sources: tuple[Source, ...], budget: int) -> Surfaces:
         table: dict[str, int] = {}
@@ -86,11 +87,17 @@ class SurfaceStage:
             ],
             origin=np.round((low + high) / 2),
         )
-        return Surfaces(sources, tuple(table), mesh, _opacity(scene, table), budget)
+        return Surfaces(sources, tuple(table), mesh, _opacity(scene, table), _catches(scene, table), budget)
 
 
 def _opacity(scene: Scene, materials: Iterable[MaterialId]) -> F32:
-    return np.array([scene.material(material).opacity for material in materials], np.float32)
+    """(M,) of each material; what shows the backdrop is not looked through as well."""
+    found = (scene.material(material) for material in materials)
+    return np.array([1.0 if m.catches else m.opacity for m in found], np.float32)
+
+
+def _catches(scene: Scene, materials: Iterable[MaterialId]) -> npt.NDArray[np.bool_]:
+    return np.array([scene.material(material).catches for material in materials], np.bool_)
 
 
 class CasterStage:

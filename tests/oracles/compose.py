@@ -6,10 +6,11 @@ import numpy as np
 import numpy.typing as npt
 from oracles.radiance import bilinear_repeat, lat_long
 
-from studio_core.scene.nodes import Light
+from studio_core.scene.nodes import ON_THE_GROUND, Light
 from studio_core.shading.artifacts import TERMS
 from studio_core.shading.lamps import shown_environment
 from studio_core.shading.materials import coefficients, linear_rgb, resolve
+from studio_core.shading.open_light import OpenLight
 
 Array = npt.NDArray[np.float64]
 NO_BACK = 0xFFFFFFFF
@@ -45,6 +46,24 @@ class Painter:
         sky = shown_environment(scene)
         self.sky = sky if sky is not None and sky.background else None
         self.sky_pixels = linear_rgb(self.sky.image).astype(np.float64) if self.sky else None
+        self.lit = np.zeros((len(self.terms), 3))
+        if self.sky is not None:
+            normals = self.mesh.normals @ self.sky.rotation().matrix()[:3, :3]
+            self.lit = radiance.irradiance(lights) / OpenLight(linear_rgb(self.sky.image)).irradiance(normals)
+            self.lit[~radiance.valid] = self.sky.gain()
+
+    def photograph(self, along, met=None):
+        """Of the environment, seen along a ray, or at a point that it meets; without gain."""
+        sky, eye = self.sky, np.array(self.view.transform.translation)
+        if sky.projection == ON_THE_GROUND:
+            foot = np.array(sky.transform.translation)
+            if met is None and eye[1] > foot[1]:
+                radius = max(sky.ground_radius, 1.25 * np.linalg.norm(eye - foot))
+                met = on_dome(eye - foot, along, radius) + foot
+            if met is not None:
+                along = met - foot - (0, sky.ground_height, 0)
+        back = sky.background_rotation().matrix()[:3, :3].T
+        return lat_long(self.sky_pixels, back @ (along / np.linalg.norm(along)))
 
     def direction(self, sample):
         view, n = self.view, self.view.antialias
@@ -62,8 +81,7 @@ class Painter:
         if face < 0:
             if self.sky is None:
                 return np.zeros(3), None
-            back = self.sky.rotation().matrix()[:3, :3].T
-            return lat_long(self.sky_pixels, back @ along) * self.sky.gain(), None
+            return self.photograph(along) * self.sky.gain(), None
         mesh = self.mesh
         corners = mesh.faces[face]
         a, b, c = mesh.positions[corners].astype(np.float64)
@@ -72,6 +90,13 @@ class Painter:
         away = normal @ along / size if size > 0 else 0.0
         weights = np.array([1 - float(hits.u[index]) - hits.v[index], hits.u[index], hits.v[index]])
         m = mesh.material[corners[0]]
+        if self.surfaces.catches[m]:
+            if self.sky is None:
+                return np.zeros(3), None
+            if away > 0 and mesh.back_faces[face, 0] != NO_BACK:
+                corners = mesh.back_faces[face]
+            met = np.array(self.view.transform.translation) + float(hits.distance[index]) * along
+            return self.photograph(along, met) * (weights @ self.lit[corners]), None
         levels, (scale, offset) = self.maps[m], self.uv[m]
         footprint = None
         if len(levels) == 1:
@@ -93,6 +118,20 @@ class Painter:
                 under, _ = self.sample(rest, at, sample)
                 colour = alpha * colour + (1 - alpha) * under
         return colour, footprint
+
+
+def on_dome(eye, along, radius):
+    """Where a ray from inside a dome about the origin meets its floor or the dome itself, by bisection."""
+
+    def inside(reach):
+        point = eye + reach * along
+        return point[1] > 0 and np.linalg.norm(point) < radius
+
+    low, high = 0.0, 4.0 * radius
+    for _ in range(80):
+        middle = (low + high) / 2
+        low, high = (middle, high) if inside(middle) else (low, middle)
+    return eye + low * along
 
 
 def picture(scene, radiance, hits, registry) -> tuple[Array, npt.NDArray[np.bool_]]:

@@ -71,7 +71,7 @@ class Room:
         shadow = RayCaster(objects, backend)
         meshes = tuple((one.geometry.key, (one.opaque,)) for one in things.values())
         casters = Casters(shadow, shadow, meshes, tuple(one.transform for one in things.values()))
-        surfaces = Surfaces(sources, ("m",), mesh, np.ones(1, np.float32), 0)
+        surfaces = Surfaces(sources, ("m",), mesh, np.ones(1, np.float32), np.zeros(1, np.bool_), 0)
         options = {"edge": edge, "backend": backend, "origin": origin}
         made = Room(dict(things), surfaces, casters, alone(surfaces, casters), options, keep)
         keep.append(made)

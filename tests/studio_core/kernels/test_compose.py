@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from oracles.radiance import bilinear_repeat, lat_long
 
-from studio_core.kernels.background import angle, background_hits
+from studio_core.kernels.background import FAR_AWAY, angle, background_hits
 from studio_core.kernels.camera import sample_directions
 from studio_core.kernels.compose import (
     AFFINE,
@@ -64,7 +64,9 @@ def test_background_equals_the_oracle(named, antialias):
     for start in range(0, len(samples), 613):  # as threads do
         stop = min(start + 613, len(samples))
         out = np.full((stop - start, 3), -1, np.float32)
-        background_hits(start, stop, pinhole(view), given_samples, face, from_camera, pixels, gain, out)
+        background_hits(
+            start, stop, pinhole(view), given_samples, face, from_camera, FAR_AWAY, pixels, gain, out
+        )
         pieces.append(out)
     for d, f, made in zip(directions, face, np.concatenate(pieces), strict=True):
         expected = 0 if f >= 0 else lat_long(pixels, turn @ d) * gain
@@ -80,7 +82,7 @@ def test_a_part_has_the_background_of_the_whole_there():
         turn = view.transform.matrix()[:3, :3].astype(np.float32)
         face, gain = np.full(len(samples), -1, np.int32), np.ones(3, np.float32)
         out = np.empty((len(samples), 3), np.float32)
-        background_hits(0, len(out), pinhole(view), samples, face, turn, pixels, gain, out)
+        background_hits(0, len(out), pinhole(view), samples, face, turn, FAR_AWAY, pixels, gain, out)
         directions = np.empty((len(samples), 3), np.float32)
         sample_directions(pinhole(view), samples, directions)
         return out, directions

@@ -8,7 +8,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from studio_core.kernels.background import background_hits
+from studio_core.kernels.background import FAR_AWAY, background_hits
 from studio_core.kernels.compose import AFFINE, CONSTANT, GENERAL, RECORD, face_texels, shade_hits
 from studio_core.kernels.directions import direction_set
 from studio_core.kernels.facing import shown_sides
@@ -129,16 +129,21 @@ def test_samples_of_any_triangle(corners, uvs, level, distance, density, kind):
         assert (out <= 4.001 * level).all()  # a plain part and three textured ones
 
 
-@given(RADIANCE, st.floats(0.01, 179.9), st.tuples(*[st.floats(-1, 1)] * 3), st.integers(1, 4))
+PLACE = st.tuples(*[st.floats(-20, 20)] * 3)
+
+
+@given(RADIANCE, st.floats(0.01, 179.9), st.tuples(*[st.floats(-1, 1)] * 3), st.integers(1, 4), PLACE)
 @QUICK
-def test_background_of_any_view(level, fov, target, rows):
+def test_background_of_any_view(level, fov, target, rows, place):
     aim = unit(target) if any(abs(c) > 1e-6 for c in target) else np.array([0, 1, 0], np.float32)
     view = View(looking((0, 0, 0), aim), fov=fov, width=5, height=5, antialias=1)
     pixels = (level * np.random.default_rng(rows).random((rows, 2 * rows, 3))).astype(np.float32)
     out = np.full((25, 3), -1, np.float32)
     nothing = np.full(25, -1, np.int32)
     turn, gain = rotation_matrix(view.transform.rotation).astype(np.float32), np.ones(3, np.float32)
-    background_hits(0, 25, pinhole(view), np.zeros(0, np.int64), nothing, turn, pixels, gain, out)
-    assert np.isfinite(out).all()
-    assert (out >= 0).all()
-    assert (out <= 1.0001 * pixels.max()).all()
+    every, dome = np.zeros(0, np.int64), np.array([*place, 1.6, 6.0, *np.eye(3).ravel()])
+    for ground in (FAR_AWAY, dome):
+        background_hits(0, 25, pinhole(view), every, nothing, turn, ground, pixels, gain, out)
+        assert np.isfinite(out).all()
+        assert (out >= 0).all()
+        assert (out <= 1.0001 * pixels.max()).all()
