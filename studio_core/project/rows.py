@@ -155,6 +155,13 @@ class Rows:
 
     def history(self, address: str) -> SavedHistory:
         """The undo history, everything under it gathered."""
+        made = self.steps(address)
+        for digest in {step.digest for step in made.steps}:
+            self.gather(digest)
+        return made
+
+    def steps(self, address: str) -> SavedHistory:
+        """The undo history, its scenes neither read nor checked."""
         value = self.value(address, "the undo history")
         steps, position = value.get("steps"), value.get("position")
         if set(value) != {"type", "steps", "position"} or value["type"] != "history" or not is_hash(steps):
@@ -174,8 +181,6 @@ class Rows:
             ):
                 raise ProjectError("the undo history is damaged: a step has the wrong form")
             made.append(SavedStep(label, str(digest), self.compose))
-        for digest in {step.digest for step in made}:
-            self.gather(digest)
         return SavedHistory(tuple(made), position)
 
     def session(self, address: str | None) -> dict[str, Any]:

@@ -126,11 +126,11 @@ def load(path: Path, *, revision: int | None = None, formats: Formats = FORMATS)
     older format is brought up to date in a copy; the file stays as it is until it is saved.
     """
     path = path.resolve()
-    with explained(path, "opened"), _current(path, formats) as (source, found):
+    with explained(path, "opened"), current(path, formats) as (source, found):
         with reading(source, formats) as (connection, _):
             rows = Rows(connection)
             revisions = rows.revisions()
-            chosen = _chosen(revisions, rows.head() if revision is None else revision)
+            chosen = revision_of(revisions, rows.head() if revision is None else revision)
             rows.gather(chosen.scene)
             scene = rows.compose(chosen.scene)
             history = None if chosen.history is None else rows.history(chosen.history)
@@ -149,7 +149,10 @@ def load_revision(path: Path, revision: int) -> LoadedProject:
 
 
 @contextmanager
-def _current(path: Path, formats: Formats) -> Iterator[tuple[Path, int]]:
+def current(path: Path, formats: Formats = FORMATS) -> Iterator[tuple[Path, int]]:
+    """A file of today's format with what `path` holds (itself, or a copy brought up to date), and the format
+    that was found.
+    """
     settle(path)
     found = file_format(path, formats)
     if found == formats.current:
@@ -187,7 +190,7 @@ def compact(path: Path) -> int:
 def _copy_newest(path: Path, target: Path) -> None:
     with reading(path) as (source, _), creating(target) as made:
         rows = Rows(source)
-        head = _chosen(rows.revisions(), rows.head())
+        head = revision_of(rows.revisions(), rows.head())
         rows.gather(head.scene)
         rows.compose(head.scene)
         if head.history is not None:
@@ -217,12 +220,13 @@ def save_copy_without_history(source: Path | Scene, target: Path, *, label: str 
 def newest(path: Path) -> Revision:
     """The revision that was saved last; ProjectError when the file cannot be read."""
     path = path.resolve()
-    with explained(path, "read"), _current(path, FORMATS) as (source, _), reading(source) as (connection, _):
+    with explained(path, "read"), current(path, FORMATS) as (source, _), reading(source) as (connection, _):
         rows = Rows(connection)
-        return _chosen(rows.revisions(), rows.head())
+        return revision_of(rows.revisions(), rows.head())
 
 
-def _chosen(revisions: tuple[Revision, ...], wanted: int) -> Revision:
+def revision_of(revisions: tuple[Revision, ...], wanted: int) -> Revision:
+    """The revision of that number; ProjectError when there is none."""
     for revision in revisions:
         if revision.id == wanted:
             return revision
@@ -234,12 +238,12 @@ def info(path: Path) -> ProjectInfo:
     path = path.resolve()
     with (
         explained(path, "read"),
-        _current(path, FORMATS) as (source, found),
+        current(path, FORMATS) as (source, found),
         reading(source) as (connection, _),
     ):
         rows = Rows(connection)
         revisions = rows.revisions()
-        chosen = _chosen(revisions, rows.head())
+        chosen = revision_of(revisions, rows.head())
         nodes, materials = rows.lists(chosen.scene)
         ((arrays, data),) = connection.execute(
             "SELECT count(*), sum(length(data)) FROM blob WHERE part >= 0"
@@ -256,8 +260,8 @@ def info(path: Path) -> ProjectInfo:
             items=int(items),
             revisions=revisions,
             steps=_steps(rows, chosen),
-            nodes=_kinds(rows, nodes, "the list of nodes", "type"),
-            materials=_kinds(rows, materials, "the list of materials", "model"),
+            nodes=kinds(rows, nodes, "the list of nodes", "type"),
+            materials=kinds(rows, materials, "the list of materials", "model"),
             opened_by=None if holder is None else holder.described(now()),
         )
 
@@ -269,6 +273,7 @@ def _steps(rows: Rows, revision: Revision) -> int:
     return len(rows.entries(root if isinstance(root, str) else None, "the undo history"))
 
 
-def _kinds(rows: Rows, root: str | None, part: str, field: str) -> Mapping[str, int]:
+def kinds(rows: Rows, root: str | None, part: str, field: str) -> Mapping[str, int]:
+    """How many items of a list have each value of a field."""
     found = Counter(str(rows.value(entry, part).get(field)) for entry in rows.entries(root, part))
     return frozen_map(dict(sorted(found.items())))

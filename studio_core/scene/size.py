@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import numpy.typing as npt
 
 from studio_core.contract import ImportedModel
 from studio_core.scene.nodes import Scene
@@ -12,8 +13,8 @@ LARGEST, SMALLEST = 30.0, 0.02
 _UNITS = ((0.01, "centimetres"), (0.001, "millimetres"), (0.0254, "inches"), (0.3048, "feet"))
 
 
-def model_size(model: ImportedModel) -> tuple[float, float, float]:
-    """Width (x), depth (z) and height (y) in metres of the box around all objects; zeros without any."""
+def model_bounds(model: ImportedModel) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
+    """Lowest and highest corner of all objects, exactly, in the model's frame; zeros without any."""
     scene = Scene().with_nodes(*model.nodes)
     low, high = np.full(3, np.inf), np.full(3, -np.inf)
     for node in model.objects:
@@ -21,7 +22,13 @@ def model_size(model: ImportedModel) -> tuple[float, float, float]:
         placed = node.geometry.positions.astype(np.float64) @ matrix[:3, :3].T + matrix[:3, 3]
         if len(placed):
             low, high = np.minimum(low, placed.min(axis=0)), np.maximum(high, placed.max(axis=0))
-    width, height, depth = (float(side) for side in (high - low if np.isfinite(low).all() else np.zeros(3)))
+    return (low, high) if np.isfinite(low).all() else (np.zeros(3), np.zeros(3))
+
+
+def model_size(model: ImportedModel) -> tuple[float, float, float]:
+    """Width (x), depth (z) and height (y) in metres of the box around all objects; zeros without any."""
+    low, high = model_bounds(model)
+    width, height, depth = (float(side) for side in high - low)
     return width, depth, height
 
 
