@@ -36,6 +36,7 @@ from studio_ui.canvas.switch_viewport import SwitchViewport
 from studio_ui.context import Context
 from studio_ui.editing import Editing
 from studio_ui.feed import PictureFeed, Shading
+from studio_ui.files.thumbnails import Thumbnails
 from studio_ui.journal import Journal
 from studio_ui.main_window import MainWindow
 from studio_ui.settings import Settings, state_folder
@@ -104,9 +105,11 @@ def assemble(
     files: Executor | None = None,
     ask: Ask | None = None,
     threads: int | None = None,
+    thumbnails: Path | None = None,
 ) -> Studio:
     """A window with an empty document; what is not given is the real thing. Needs a QApplication."""
     settings = settings or Settings(state_folder())
+    thumbnails = thumbnails or user_cache() / "thumbnails"
     host = host or PluginHost.discover()
     workers = Workers(threads)
     compute, files = compute or ComputeThread(), files or ComputeThread()
@@ -118,7 +121,8 @@ def assemble(
     shading = shading or PluginShading(Services(workers, host, DiskCache(user_cache() / "computed")))
     feed = PictureFeed(document, session, shading, compute, bridge.post, bridge.later)
     context = Context(document, session, editing, host, journal, tasks, feed)
-    window = MainWindow(context, SwitchViewport(RasterViewport()), settings, files, _samples(), ask)
+    viewport = SwitchViewport(RasterViewport())
+    window = MainWindow(context, viewport, settings, files, _samples(), ask, Thumbnails(thumbnails))
     for failure in host.failures:
         journal.write(f"The plugin {failure.plugin} {failure.what}", "problem", failure.traceback)
     _warm(context, compute, files, bridge)
@@ -164,8 +168,11 @@ def _first(studio: Studio, path: Path | None, read_only: bool) -> None:
         if path is not None:
             files.open(path, read_only=read_only)
             return
-        with contextlib.suppress(LucarneError):
-            files.open_copy(samples.sample())
+        if studio.window.settings.recent:
+            studio.window.front.start_page.refresh()
+        else:
+            with contextlib.suppress(LucarneError):
+                files.open_copy(samples.sample())
         files.offer_unsaved()
 
     studio.bridge.later(0, start)

@@ -16,7 +16,8 @@ from pytestqt.qtbot import QtBot
 from studio.app import Studio
 from studio_core.document import Step
 from studio_core.edits import Add
-from studio_core.project.recovery import Recovery
+from studio_core.project.lock import Holder
+from studio_core.project.outline import Outline
 from studio_core.scene.diff import Aspect
 from studio_core.scene.geometry import Geometry
 from studio_core.scene.nodes import Group, Material, MeshObject, Scene
@@ -26,9 +27,10 @@ from studio_core.shading.artifacts import MeasuredError, Picture
 from studio_core.shading.frame import Frame
 from studio_core.shading.job import Job
 from studio_core.shading.pipeline import Inputs, Pipeline
-from studio_ui.ask import Filter, Recover, Unsaved
+from studio_ui.ask import Filter, LeftoverChoice, Recover, Unsaved
 from studio_ui.canvas.projection import axes_of, extent, eye_of, project
 from studio_ui.feed import Freshness
+from studio_ui.files.leftovers import Leftover
 
 
 def box(size: float = 1.0) -> Geometry:
@@ -141,23 +143,44 @@ class Answers:
 
     unsaved_: Unsaved = "discard"
     recover_: Recover = "recovered"
-    read_only_: bool = True
+    take_over_: bool = True
+    version_: int | None = None  # from the newest
+    compact_: bool = True
     unit_: float | None = 1.0
     files: list[Path] = field(default_factory=list)
     target: Path | None = None
     asked: list[str] = field(default_factory=list)
+    left: list[Leftover] = field(default_factory=list)
+    versions: list[Outline] = field(default_factory=list)
 
     def unsaved(self, name: str) -> Unsaved:
         self.asked.append("unsaved")
         return self.unsaved_
 
-    def recover(self, found: Recovery) -> Recover:
+    def recover(self, found: Leftover) -> Recover:
         self.asked.append("recover")
+        self.left = [found]
         return self.recover_
 
-    def read_only(self, problem: str) -> bool:
-        self.asked.append(problem)
-        return self.read_only_
+    def leftovers(self, found: Sequence[Leftover]) -> LeftoverChoice:
+        self.asked.append("leftovers")
+        self.left = list(found)
+        if self.recover_ == "recovered":
+            return LeftoverChoice(found[0])
+        return LeftoverChoice(None, tuple(found) if self.recover_ == "saved" else ())
+
+    def take_over(self, name: str, holder: Holder) -> bool:
+        self.asked.append(f"take over from {holder.host}")
+        return self.take_over_
+
+    def version(self, name: str, found: Sequence[Outline]) -> Outline | None:
+        self.asked.append("version")
+        self.versions = list(found)
+        return None if self.version_ is None else found[self.version_]
+
+    def compact(self, name: str, versions: int) -> bool:
+        self.asked.append(f"compact {versions}")
+        return self.compact_
 
     def unit(self, name: str, size: tuple[float, float, float], question: str) -> float | None:
         self.asked.append(question)

@@ -43,6 +43,7 @@ def make(qtbot: QtBot, tmp_path: Path) -> Iterator[Make]:
             shading=fake,
             ask=answers,
             threads=1,
+            thumbnails=tmp_path / "thumbnails",
             **given,
         )
         made.append(Driver(studio, fake, answers, qtbot))

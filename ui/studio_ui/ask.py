@@ -7,7 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal, Protocol
 
-from studio_core.project.recovery import Recovery
+from studio_core.project.lock import Holder
+from studio_core.project.outline import Outline
+from studio_ui.files.leftovers import Leftover
 
 Unsaved = Literal["save", "discard", "cancel"]
 Recover = Literal["recovered", "saved", "later"]
@@ -26,6 +28,14 @@ class Filter:
         return f"{self.label} ({' '.join('*' + e for e in self.extensions)})"
 
 
+@dataclass(frozen=True)
+class LeftoverChoice:
+    """What to open of several leftovers, and which nobody wants; all others wait for another time."""
+
+    open: Leftover | None = None
+    discard: tuple[Leftover, ...] = ()
+
+
 class Ask(Protocol):
     """Every answer may be None or "cancel": nothing happens then."""
 
@@ -33,12 +43,24 @@ class Ask(Protocol):
         """What to do with changes that are in no file."""
         ...
 
-    def recover(self, found: Recovery) -> Recover:
+    def recover(self, found: Leftover) -> Recover:
         """Which version to open after the program ended badly."""
         ...
 
-    def read_only(self, problem: str) -> bool:
-        """Whether to open a project read-only that somebody else has open."""
+    def leftovers(self, found: Sequence[Leftover]) -> LeftoverChoice:
+        """Which of the documents to open that were never saved when the program ended badly."""
+        ...
+
+    def take_over(self, name: str, holder: Holder) -> bool:
+        """Whether to disregard the lock of another machine, which may be at work on the project."""
+        ...
+
+    def version(self, name: str, found: Sequence[Outline]) -> Outline | None:
+        """Which saved version to open as a copy; the newest is first."""
+        ...
+
+    def compact(self, name: str, versions: int) -> bool:
+        """Whether to drop a project's earlier versions for good."""
         ...
 
     def unit(self, name: str, size: tuple[float, float, float], question: str) -> float | None:

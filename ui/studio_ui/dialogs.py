@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -23,9 +22,13 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from studio_core.project.recovery import Recovery
+from studio_core.project.lock import Holder
+from studio_core.project.outline import Outline
 from studio_core.registry import PluginHost
-from studio_ui.ask import UNITS, Filter, Recover, Unsaved
+from studio_ui.ask import UNITS, Filter, LeftoverChoice, Recover, Unsaved
+from studio_ui.files.leftovers import Leftover
+from studio_ui.files.recovery_dialog import LeftoversDialog, RecoveryDialog
+from studio_ui.files.versions_dialog import VersionsDialog
 from studio_ui.panels.panel import heading, note
 
 _GUESS = ((0.2, 5.0), (0.05, 15.0))  # metres that the longest side of furniture probably has
@@ -51,38 +54,52 @@ class Dialogs:
         answers: dict[int, Unsaved] = {kinds.Save.value: "save", kinds.Discard.value: "discard"}
         return answers.get(box.exec(), "cancel")
 
-    def recover(self, found: Recovery) -> Recover:
-        """Both versions, with their times."""
+    def recover(self, found: Leftover) -> Recover:
+        """Both versions, with their pictures and times."""
+        dialog = RecoveryDialog(self._parent, found)
+        dialog.exec()
+        dialog.deleteLater()
+        return dialog.answer
+
+    def leftovers(self, found: Sequence[Leftover]) -> LeftoverChoice:
+        """Documents that were never saved."""
+        dialog = LeftoversDialog(self._parent, found)
+        dialog.exec()
+        dialog.deleteLater()
+        return dialog.choice
+
+    def take_over(self, name: str, holder: Holder) -> bool:
+        """Whether the other machine really has it open no more."""
+        box = QMessageBox(self._parent)
+        box.setIcon(QMessageBox.Icon.Warning)
+        box.setWindowTitle("Open for saving")
+        box.setText(f"Is {name} really not open on {holder.host} any more?")
+        box.setInformativeText("If it is, whoever saves last overwrites what the other one did.")
+        take = box.addButton("Open for saving", QMessageBox.ButtonRole.AcceptRole)
+        box.setDefaultButton(box.addButton(QMessageBox.StandardButton.Cancel))
+        box.exec()
+        return box.clickedButton() is take
+
+    def version(self, name: str, found: Sequence[Outline]) -> Outline | None:
+        """One of the saved versions."""
+        dialog = VersionsDialog(self._parent, name, found)
+        accepted = dialog.exec()
+        dialog.deleteLater()
+        return dialog.chosen if accepted else None
+
+    def compact(self, name: str, versions: int) -> bool:
+        """Whether earlier versions may go."""
         box = QMessageBox(self._parent)
         box.setIcon(QMessageBox.Icon.Question)
-        box.setWindowTitle("Recover")
-        box.setText("The program ended without saving everything.")
-        name = found.project.name if found.project is not None else "A project that was never saved"
-        lines = [name]
-        if found.recovered is not None:
-            lines.append(f"Recovered version: {_when(found.recovered.time)}")
-        lines.append(
-            f"Saved version: {_when(found.saved.time)}" if found.saved else "There is no saved version."
-        )
-        box.setInformativeText("\n".join(lines))
-        recovered = box.addButton("Open the recovered version", QMessageBox.ButtonRole.AcceptRole)
-        saved = None
-        if found.saved is not None:
-            saved = box.addButton("Open the saved version", QMessageBox.ButtonRole.DestructiveRole)
-        box.addButton("Decide later", QMessageBox.ButtonRole.RejectRole)
-        box.setDefaultButton(recovered)
+        box.setWindowTitle("Compact project")
+        what = {0: "There is no earlier version", 1: "One earlier version goes"}
+        box.setText(f"Save {name} and make its file smaller?")
+        text = what.get(versions, f"{versions} earlier versions go")
+        box.setInformativeText(f"{text}; the undo history stays.")
+        shrink = box.addButton("Compact", QMessageBox.ButtonRole.AcceptRole)
+        box.setDefaultButton(box.addButton(QMessageBox.StandardButton.Cancel))
         box.exec()
-        if box.clickedButton() is recovered:
-            return "recovered"
-        return "saved" if saved is not None and box.clickedButton() is saved else "later"
-
-    def read_only(self, problem: str) -> bool:
-        """Open it all the same, without being able to save over it?"""
-        kinds = QMessageBox.StandardButton
-        answer = QMessageBox.question(
-            self._parent, "Open read-only", f"{problem}.\n\nOpen it read-only?", kinds.Open | kinds.Cancel
-        )
-        return answer == kinds.Open
+        return box.clickedButton() is shrink
 
     def unit(self, name: str, size: tuple[float, float, float], question: str) -> float | None:
         """The unit, with what the size would be in each."""
@@ -220,7 +237,3 @@ def likely_unit(size: tuple[float, float, float]) -> float:
             if low <= max(size) * factor <= high:
                 return factor
     return 1.0
-
-
-def _when(seconds: float) -> str:
-    return time.strftime("%d %B %Y, %H:%M:%S", time.localtime(seconds))

@@ -22,6 +22,10 @@ from studio_ui.context import Context
 from studio_ui.dialogs import Dialogs
 from studio_ui.drops import take_files
 from studio_ui.features import Feature, gather
+from studio_ui.files.front import Front
+from studio_ui.files.saved_label import SavedLabel
+from studio_ui.files.thumbnails import Thumbnails
+from studio_ui.files.versions import Versions
 from studio_ui.following import Following
 from studio_ui.help import Help
 from studio_ui.hint_bar import HintBar
@@ -50,6 +54,7 @@ class MainWindow(QMainWindow):
         files_executor: Executor,
         samples: Mapping[str, Path] | None = None,
         ask: Ask | None = None,
+        thumbnails: Thumbnails | None = None,
     ) -> None:
         super().__init__()
         self.context, self.viewport, self.settings = context, viewport, settings
@@ -62,19 +67,26 @@ class MainWindow(QMainWindow):
         self.quality = QualityControl(context, width=64)
         self.status.addPermanentWidget(self.quality)
         self.hints = HintBar(context, settings)
-        self.setCentralWidget(stacked(self.hints, viewport.widget))
         self.ask = ask or Dialogs(self)
-        self.files = ProjectFiles(context, self.ask, settings, files_executor)
+        thumbnails = thumbnails or Thumbnails(settings.folder / "thumbnails")
+        self.files = ProjectFiles(context, self.ask, settings, files_executor, thumbnails)
+        self.saved = SavedLabel(self.files)
+        self.status.addPermanentWidget(self.saved)
         self.following = Following(self, context, viewport, self.status, self.files)
-        handlers, conditions = gather(self._features())
+        features = self._features()
+        self.front = Front(
+            context, viewport.widget, self.files, samples or {}, self.transfer.load_environment
+        )
+        self.setCentralWidget(stacked(self.hints, self.front.widget))
+        handlers, conditions = gather(features)
         self.actions_ = ActionSet(self, viewport.widget, handlers, conditions, self.following.soon)
         for panel in self.panels.values():
             panel.use_actions(self.actions_.actions)
-        self.menus = Menus(self.menuBar(), self.actions_, context, self.commands, self.files, settings)
+        self.menus = Menus(self.menuBar(), self.actions_, context, self.commands, self.files)
         self.menus.offer_samples(samples or {})
         self.menus.offer_panels(self.docks)
         self._make_bar()
-        wearers = [panel.set_theme for panel in self.panels.values()]
+        wearers = [self.front.set_theme, *(panel.set_theme for panel in self.panels.values())]
         self.appearance.start([self.actions_.set_theme, viewport.set_theme, self.hints.set_theme, *wearers])
         self._follow()
         self.resize(1440, 900)
@@ -95,6 +107,7 @@ class MainWindow(QMainWindow):
         return [
             self,
             self.files,
+            Versions(context, self.ask, self.files),
             self.transfer,
             self.commands,
             self.appearance,
@@ -181,6 +194,8 @@ class MainWindow(QMainWindow):
         self.context.tasks.cancel()
         self.files.close()
         self.following.close()
+        self.front.close()
+        self.saved.close_panel()
         self.view_controls.close_panel()
         self.hints.close_panel()
         self.quality.close_panel()

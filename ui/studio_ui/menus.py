@@ -6,14 +6,15 @@ from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
 
+from PySide6.QtGui import QIcon, QPixmap
 from PySide6.QtWidgets import QDockWidget, QMenu, QMenuBar
 
 from studio_core.scene.nodes import Camera
 from studio_ui.actions.action_set import ActionSet
 from studio_ui.commands import Commands
 from studio_ui.context import Context
+from studio_ui.files.recent import folder_text, shared_names
 from studio_ui.project_files import ProjectFiles
-from studio_ui.settings import Settings
 
 
 class Menus:
@@ -26,10 +27,9 @@ class Menus:
         context: Context,
         commands: Commands,
         files: ProjectFiles,
-        settings: Settings,
     ) -> None:
         self._actions, self._context, self._commands = actions, context, commands
-        self._files, self._settings = files, settings
+        self._files = files
         actions.fill_menus(bar)
         file, view = actions.menus["File"], actions.menus["View"]
         self.recent, self.samples = file.addMenu("Open recent"), file.addMenu("Open sample")
@@ -39,6 +39,7 @@ class Menus:
         view.insertMenu(actions["view.new_camera"], self.cameras)
         self.recent.aboutToShow.connect(self.fill_recent)
         self.cameras.aboutToShow.connect(self.fill_cameras)
+        self.recent.setToolTipsVisible(True)
         self.samples.setEnabled(False)
 
     def offer_samples(self, samples: Mapping[str, Path]) -> None:
@@ -55,10 +56,21 @@ class Menus:
         window.insertSeparator(reset)
 
     def fill_recent(self) -> None:
-        """Projects opened lately."""
+        """Projects opened lately, with their pictures."""
         self.recent.clear()
-        for path in self._settings.recent:
-            self.recent.addAction(str(path), partial(self._files.open, path))
+        projects = self._files.recent.projects
+        alike = shared_names(projects)
+        for project in projects:
+            name = project.name.replace("&", "&&")
+            folder = f"  ({folder_text(project.path)})" if project.name in alike else ""
+            entry = self.recent.addAction(f"{name}{folder}", partial(self._files.open, project.path))
+            entry.setToolTip(str(project.path))
+            entry.setEnabled(project.there)
+            if project.image is not None:
+                entry.setIcon(QIcon(QPixmap.fromImage(project.image)))
+        if projects:
+            self.recent.addSeparator()
+            self.recent.addAction("Clear list", self._files.recent.clear)
         _or_none(self.recent)
 
     def fill_cameras(self) -> None:

@@ -1,29 +1,15 @@
-"""Opening, saving, autosaving and recovering the document; everything slow happens on the files' thread."""
+"""Opening, saving and recovering the document; everything slow happens on the files' thread."""
 
 from __future__ import annotations
 
-import contextlib
-import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 from studio_core.document import Step
-from studio_core.errors import LucarneError
-from studio_core.project.lock import LockedError, ProjectLock, acquire
-from studio_core.project.records import History, LoadedProject
-from studio_core.project.recovery import (
-    Autosaver,
-    Recovery,
-    RecoveryFile,
-    discard,
-    find_recovery,
-    find_unsaved,
-    recovery_path,
-    unsaved_path,
-)
-from studio_core.project.store import load, save
+from studio_core.project.lock import ProjectLock, acquire
+from studio_core.project.records import History
+from studio_core.project.store import newest, save
 from studio_core.scene.diff import Changes
 from studio_core.scene.nodes import Scene
 from studio_core.shading.job import Job
@@ -31,6 +17,11 @@ from studio_core.shading.scheduler import Executor
 from studio_core.signal import Signal
 from studio_ui.ask import Ask, Filter
 from studio_ui.context import Context
+from studio_ui.files.keeper import Keeper
+from studio_ui.files.leftovers import Leftover, beside, never_saved
+from studio_ui.files.opening import Opened, ReadOnly, forget, locked, read
+from studio_ui.files.recent import RecentProjects
+from studio_ui.files.thumbnails import Thumbnails
 from studio_ui.session_form import session_form, take_session
 from studio_ui.settings import Settings
 
@@ -39,37 +30,36 @@ PROJECTS = Filter("Lucarne projects", (SUFFIX,))
 Then = Callable[[], object]
 
 
-@dataclass(frozen=True)
-class _Opened:
-    loaded: LoadedProject
-    steps: tuple[Step, ...]
-    position: int
-    lock: ProjectLock | None = None
-    recovery: Recovery | None = None
-
-
 class ProjectFiles:
-    """The file behind the document. `changed()` when path, name or read-only state change."""
+    """The file behind the document. `changed()` when path, name or read-only state change; `opened()` when
+    another document is shown.
+    """
 
-    def __init__(self, context: Context, ask: Ask, settings: Settings, executor: Executor) -> None:
+    def __init__(
+        self, context: Context, ask: Ask, settings: Settings, executor: Executor, thumbnails: Thumbnails
+    ) -> None:
         self.path: Path | None = None
-        self.read_only = False
+        self.locked_out: ReadOnly | None = None
         self.changed: Signal[[]] = Signal()
         self.opened: Signal[[]] = Signal()
+        self.keeper = Keeper(context, executor, settings.folder, thumbnails)
+        self.recent = RecentProjects(settings, thumbnails, context.tasks)
         self._context, self._ask, self._settings, self._executor = context, ask, settings, executor
         self._name = "Untitled"
         self._lock: ProjectLock | None = None
-        self._recovery: RecoveryFile | None = None
-        self._recovery_lock: ProjectLock | None = None
-        self._leftover: Path | None = None  # a recovered file, kept until there is a newer one
+        self._revision = 0  # that was opened or saved last
         self._taking = False
-        self._autosaver = Autosaver()
         self._off = context.document.changed.connect(self._edited)
 
     @property
     def name(self) -> str:
         """What the title bar says."""
         return self.path.stem if self.path is not None else self._name
+
+    @property
+    def read_only(self) -> bool:
+        """Whether it cannot be saved where it is."""
+        return self.locked_out is not None
 
     @property
     def modified(self) -> bool:
@@ -106,6 +96,7 @@ class ProjectFiles:
         self._restore((Step("New", scene),), 0)
         take_session(self._context.session, {}, scene, [])
         self.opened.emit()
+        self.changed.emit()
 
     def choose(self) -> None:
         """Ask for a project and open it."""
@@ -114,100 +105,147 @@ class ProjectFiles:
             self.open(chosen[0])
 
     def open(self, path: Path, *, read_only: bool = False) -> None:
-        """Open a project after asking about unsaved changes."""
+        """Open a project after asking about unsaved changes; read-only when somebody else has it open."""
         self._guarded(lambda: self._open(path, read_only))
 
-    def open_copy(self, path: Path) -> None:
-        """Open a project as a new document (samples)."""
-        self._guarded(lambda: self._open(path, True, copy=True))
+    def open_copy(self, path: Path, revision: int | None = None) -> None:
+        """Open a project, or one of its earlier versions, as a new document (samples)."""
+        self._guarded(lambda: self._open(path, True, copy=True, revision=revision))
+
+    def take_over(self) -> None:
+        """Open for writing what another machine holds, after asking."""
+        path, why = self.path, self.locked_out
+        if path is None or why is None or why.holder is None:
+            return
+        if self._ask.take_over(path.name, why.holder):
+            self._regain(path, take_over=True)
+
+    def try_again(self) -> None:
+        """Become able to save: at once when nobody saved meanwhile, else by opening what they saved."""
+        if self.path is not None and self.read_only:
+            self._regain(self.path, take_over=False)
 
     def offer_unsaved(self) -> None:
         """Offer what was never saved when the program last ended badly."""
 
-        def look(job: Job) -> list[Recovery]:
-            return find_unsaved(self._settings.folder)
+        def look(job: Job) -> list[Leftover]:
+            return never_saved(self._settings.folder, self.keeper.thumbnails)
 
-        def offer(found: list[Recovery]) -> None:
-            for recovery in found:
-                if recovery.recovered is None:
-                    self._context.journal.write(recovery.problem, "warning")
-                elif not self.modified and self._ask.recover(recovery) == "recovered":
-                    self._recover(recovery)
-                    return
+        def offer(found: list[Leftover]) -> None:
+            for leftover in found:
+                if leftover.recovered is None:
+                    self._context.journal.write(leftover.found.problem, "warning")
+            whole = [leftover for leftover in found if leftover.recovered is not None]
+            if not whole or self.modified:
+                return
+            answer = self._ask.leftovers(whole)
+            for leftover in answer.discard:
+                self._executor.submit(lambda path=leftover.found.path: forget(path))
+                self.keeper.thumbnails.forget(leftover.found.path)
+            if answer.open is not None:
+                self._recover(answer.open)
 
         self._context.tasks.run("Looking for unsaved work", look, offer, quiet=True)
 
-    def _open(self, path: Path, read_only: bool, *, copy: bool = False) -> None:
-        def work(job: Job) -> _Opened:
-            lock = None if read_only else acquire(path)
+    def _open(self, path: Path, read_only: bool, *, copy: bool = False, revision: int | None = None) -> None:
+        mine = self._lock if self.path == path else None  # the same project once more
+
+        def work(job: Job) -> Opened:
+            if mine is not None and not read_only:
+                return replace(read(path, revision), lock=mine)
+            lock, why = (None, ReadOnly()) if read_only else locked(path)
             try:
-                recovery = None if read_only else find_recovery(path)
-                opened = _read(path)
+                leftover = beside(path, self.keeper.thumbnails) if lock is not None else None
+                return replace(read(path, revision), lock=lock, leftover=leftover, read_only=why)
             except BaseException:
                 if lock is not None:
                     lock.release()
                 raise
-            return _Opened(opened.loaded, opened.steps, opened.position, lock, recovery)
 
-        def done(opened: _Opened) -> None:
-            recovery = opened.recovery
-            if recovery is not None and recovery.recovered is not None:
-                answer = self._ask.recover(recovery)
+        def done(opened: Opened) -> None:
+            leftover = opened.leftover
+            if leftover is not None and leftover.recovered is not None:
+                answer = self._ask.recover(leftover)
                 if answer == "recovered":
-                    self._recover(recovery, opened.lock)
+                    self._recover(leftover, opened.lock)
                     return
                 if answer == "later":
                     if opened.lock is not None:
                         opened.lock.release()
                     return
-            self._take(path, opened, read_only and not copy, copy)
+            self._take(path, opened, copy)
 
         def failed(error: Exception) -> None:
-            if isinstance(error, LockedError) and self._ask.read_only(str(error)):
-                self._open(path, True)
-            elif not path.exists():
-                self._settings.forget(path)
-                self.changed.emit()
+            self.recent.refresh()
 
         self._context.tasks.run(f"Opening {path.name}", work, done, failed)
 
-    def _recover(self, recovery: Recovery, lock: ProjectLock | None = None) -> None:
-        def done(opened: _Opened) -> None:
-            path = recovery.project
-            if path is not None:
-                self._take(path, _Opened(opened.loaded, opened.steps, opened.position, lock), False, False)
-            else:
-                self._take(recovery.path, opened, False, True)
-                self._name = "Recovered"
+    def _recover(self, leftover: Leftover, lock: ProjectLock | None = None) -> None:
+        path, source = leftover.found.project, leftover.found.path
+
+        def done(opened: Opened) -> None:
+            self._take(path or source, replace(opened, lock=lock), copy=path is None)
             self._context.document.saved_scene = None
             if path is None:
-                self._leftover = recovery.path
-                self._make_recovery(None)
-            self._autosaver.changed(time.monotonic())
+                self._name = "Recovered"
+                self.keeper.hold(source)
+            self.keeper.edited(path)
             self.changed.emit()
 
         def failed(error: Exception) -> None:
             if lock is not None:
                 lock.release()
 
-        self._context.tasks.run("Recovering", lambda job: _read(recovery.path), done, failed)
+        self._context.tasks.run("Recovering", lambda job: read(source), done, failed)
 
-    def _take(self, path: Path, opened: _Opened, read_only: bool, copy: bool) -> None:
-        self._leave(None if copy or read_only else path, opened.lock)
+    def _take(self, path: Path, opened: Opened, copy: bool) -> None:
+        why = None if copy else opened.read_only
+        self._leave(None if copy or why is not None else path, opened.lock)
         self.path = None if copy else path
-        self.read_only = read_only
+        self.locked_out, self._revision = why, opened.loaded.revision.id
         self._name = path.stem.replace("-", " ").capitalize() if copy else "Untitled"
         context = self._context
         self._restore(opened.steps, opened.position)
         backends = list(context.host.names("backend"))
         take_session(context.session, opened.loaded.session, context.document.scene, backends)
+        self.opened.emit()
         for note in opened.loaded.notes:
             context.journal.write(note)
         if not copy:
-            self._settings.opened(path)
-        context.journal.write(f"Opened {path.name}{' read-only' if read_only else ''}.")
-        self.opened.emit()
+            self.recent.opened(path)
+        context.journal.write(f"Opened {path.name}{' read-only' if why is not None else ''}.")
         self.changed.emit()
+
+    def _regain(self, path: Path, *, take_over: bool) -> None:
+        revision = self._revision
+
+        def work(job: Job) -> tuple[ProjectLock, bool]:
+            lock = acquire(path, take_over=take_over)
+            try:
+                return lock, newest(path).id == revision
+            except BaseException:
+                lock.release()
+                raise
+
+        def done(found: tuple[ProjectLock, bool]) -> None:
+            lock, same = found
+            if same:
+                self._lock, self.locked_out = lock, None
+                self.keeper.drop()
+                self.keeper.begin(path)
+                if self.modified:
+                    self.keeper.edited(path)
+                self._context.journal.write(f"{path.name} can be saved again.")
+                self.changed.emit()
+                return
+            lock.release()
+            if self.modified:
+                text = f"{path.name} was changed by somebody else: save your version as a copy."
+                self._context.journal.write(text, "problem")
+            else:
+                self._open(path, False)
+
+        self._context.tasks.run(f"Trying to open {path.name} again", work, done)
 
     # save
 
@@ -220,41 +258,48 @@ class ProjectFiles:
 
     def save_as(self, then: Then | None = None) -> None:
         """Ask for a file and save there."""
-        folder = self.path.parent if self.path is not None else self._last_folder()
-        chosen = self._ask.save_file("Save project", folder / f"{self.name}{SUFFIX}", [PROJECTS])
+        chosen = self.ask_where("Save project", self.name)
         if chosen is not None:
-            path = chosen if chosen.suffix.lower() == SUFFIX else chosen.with_name(chosen.name + SUFFIX)
-            self._save(path, then)
+            self._save(chosen, then)
+
+    def ask_where(self, title: str, name: str) -> Path | None:
+        """A project file to write."""
+        folder = self.path.parent if self.path is not None else self._last_folder()
+        chosen = self._ask.save_file(title, folder / f"{name}{SUFFIX}", [PROJECTS])
+        if chosen is None or chosen.suffix.lower() == SUFFIX:
+            return chosen
+        return chosen.with_name(chosen.name + SUFFIX)
 
     def _save(self, path: Path, then: Then | None) -> None:
         context = self._context
         context.editing.finish()
-        scene, history = context.document.scene, self._history()
-        form = session_form(context.session)
+        document = context.document
+        scene, history = document.scene, History(document.history, document.position)
+        form, picture = session_form(context.session), self.keeper.picture(path)
         elsewhere = path != self.path or self.read_only
 
-        def work(job: Job) -> ProjectLock | None:
+        def work(job: Job) -> tuple[ProjectLock | None, int]:
             lock = acquire(path) if elsewhere else None
             try:
-                save(path, scene, label="Saved", history=history, session=form, fresh=elsewhere)
+                report = save(path, scene, label="Saved", history=history, session=form, fresh=elsewhere)
             except BaseException:
                 if lock is not None:
                     lock.release()
                 raise
-            return lock
+            if picture is not None:
+                picture()
+            return lock, report.revision
 
-        def done(lock: ProjectLock | None) -> None:
-            context.document.mark_saved(scene)
+        def done(found: tuple[ProjectLock | None, int]) -> None:
+            document.mark_saved(scene)
             if elsewhere:
-                self._leave(path, lock)
-                self.path, self.read_only = path, False
-            else:
-                self._drop_recovery()
-                self._make_recovery(path)
-            self._autosaver.saved()
+                self._leave(path, found[0])
+                self.path = path
+            self._revision = found[1]
+            self.keeper.saved(path)
             if self.modified:
-                self._autosaver.changed(time.monotonic())
-            self._settings.opened(path)
+                self.keeper.edited(path)
+            self.recent.opened(path)
             context.journal.write(f"Saved {path.name}.")
             self.changed.emit()
             if then is not None:
@@ -262,86 +307,15 @@ class ProjectFiles:
 
         context.tasks.run(f"Saving {path.name}", work, done)
 
-    def _history(self) -> History:
-        document = self._context.document
-        return History(document.history, document.position)
-
     def _last_folder(self) -> Path:
         recent = self._settings.recent
         return recent[0].parent if recent and recent[0].parent.is_dir() else Path.home()
 
-    # autosave
+    # following and leaving
 
     def tick(self) -> None:
         """Asked by a timer: autosave when it is due."""
-        context, recovery = self._context, self._recovery
-        now = time.monotonic()
-        if recovery is None or not self._autosaver.due(now) or context.document.in_gesture:
-            return
-        if not self.modified:
-            self._autosaver.saved()
-            return
-        self._autosaver.started(now)
-        scene, history, form = context.document.scene, self._history(), session_form(context.session)
-
-        def work(job: Job) -> None:
-            recovery.write(scene, history=history, session=form)
-
-        def failed(error: Exception) -> None:
-            self._autosaver.failed(time.monotonic(), str(error))
-
-        def done(_: None) -> None:
-            self._autosaver.done()
-            self._drop_leftover()
-
-        context.tasks.run("Autosaving", work, done, failed, quiet=True)
-
-    def _edited(self, before: Scene, after: Scene, changes: Changes) -> None:
-        if self._taking:
-            return
-        self._autosaver.changed(time.monotonic())
-        if self._recovery is None:
-            self._make_recovery(self.path if not self.read_only else None)
-        self.changed.emit()
-
-    def _make_recovery(self, project: Path | None) -> None:
-        if project is not None:
-            self._recovery = RecoveryFile(recovery_path(project), project)
-            return
-        path = unsaved_path(self._settings.folder)
-        self._recovery = RecoveryFile(path)
-        with contextlib.suppress(LucarneError, OSError):
-            path.parent.mkdir(parents=True, exist_ok=True)
-            self._recovery_lock = acquire(path)
-
-    def _drop_recovery(self) -> None:
-        """After what the files' thread still has to write."""
-        self._drop_leftover()
-        recovery, lock = self._recovery, self._recovery_lock
-        self._recovery = self._recovery_lock = None
-
-        def drop() -> None:
-            if recovery is not None:
-                _quietly(recovery.discard)
-            if lock is not None:
-                lock.release()
-
-        self._executor.submit(drop)
-
-    def _drop_leftover(self) -> None:
-        leftover, self._leftover = self._leftover, None
-        if leftover is not None:
-            self._executor.submit(lambda: _quietly(lambda: discard(leftover)))
-
-    def _restore(self, steps: tuple[Step, ...], position: int) -> None:
-        self._taking = True
-        try:
-            self._context.document.restore(steps, position)
-        finally:
-            self._taking = False
-        self._context.session.select([])
-
-    # leaving
+        self.keeper.tick()
 
     def leave(self, then: Then) -> None:
         """Ask about unsaved changes, then go on; nothing happens on Cancel."""
@@ -351,6 +325,19 @@ class ProjectFiles:
         """Give back locks and remove the recovery file: what is lost now was meant to be."""
         self._off()
         self._leave(None)
+
+    def _edited(self, before: Scene, after: Scene, changes: Changes) -> None:
+        if not self._taking:
+            self.keeper.edited(self.path if not self.read_only else None)
+            self.changed.emit()
+
+    def _restore(self, steps: tuple[Step, ...], position: int) -> None:
+        self._taking = True
+        try:
+            self._context.document.restore(steps, position)
+        finally:
+            self._taking = False
+        self._context.session.select([])
 
     def _guarded(self, then: Then) -> None:
         self._context.editing.finish()
@@ -366,24 +353,9 @@ class ProjectFiles:
     def _leave(self, path: Path | None, lock: ProjectLock | None = None) -> None:
         """Let go of the file behind the document and take another one."""
         old, self._lock = self._lock, lock
-        self._drop_recovery()
-        if old is not None:
+        self.keeper.left()
+        if old is not None and old is not lock:
             self._executor.submit(old.release)
-        self.path, self.read_only = None, False
-        self._autosaver.saved()
+        self.path, self.locked_out = None, None
         if path is not None:
-            self._make_recovery(path)
-
-
-def _read(path: Path) -> _Opened:
-    loaded = load(path)
-    if loaded.history is None:
-        return _Opened(loaded, (Step("Open", loaded.scene),), 0)
-    steps, position = loaded.history.opened()
-    return _Opened(loaded, steps, position)
-
-
-def _quietly(action: Callable[[], Any]) -> None:
-    """A leftover file is no reason to trouble anybody."""
-    with contextlib.suppress(LucarneError, OSError):
-        action()
+            self.keeper.begin(path)

@@ -130,6 +130,12 @@ QScrollBar::add-page, QScrollBar::sub-page { background: transparent; }
 QGroupBox { border: none; border-top: 1px solid $border; margin-top: 14px; padding-top: 6px;
     font-weight: 600; }
 QGroupBox::title { subcontrol-origin: margin; left: 0; color: $dim; }
+QFrame#notice { background: $raised; border: 1px solid $border; border-left: 4px solid $dim;
+    border-radius: 5px; }
+QFrame#notice[role="problem"] { border-left-color: $problem; }
+QFrame#notice[role="warning"] { border-left-color: $warning; }
+QToolButton#corner { background: rgba(20, 20, 20, 150); border: none; border-radius: 12px; }
+QToolButton#corner:hover, QToolButton#corner:focus { background: rgba(20, 20, 20, 230); }
 QFrame#hints { background: $raised; border: none; border-bottom: 1px solid $border; }
 QLabel[role="dim"] { color: $dim; }
 QLabel[role="warning"] { color: $warning; }

@@ -1,0 +1,64 @@
+"""What lies before the canvas: the start page, what went wrong, who else has the project open."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+from PySide6.QtWidgets import QWidget
+
+from studio_ui.canvas.layered import Layered
+from studio_ui.context import Context, Subscriptions
+from studio_ui.files.notice_bar import Notices
+from studio_ui.files.read_only_bar import ReadOnlyBar
+from studio_ui.files.start_page import Begin, StartPage
+from studio_ui.project_files import ProjectFiles
+from studio_ui.theme import Theme
+
+
+class Front:
+    """Builds these things over a canvas and follows the files; `widget` is the canvas with all of it."""
+
+    def __init__(
+        self,
+        context: Context,
+        canvas: QWidget,
+        files: ProjectFiles,
+        samples: Mapping[str, Path],
+        load_environment: Callable[[], object],
+    ) -> None:
+        self.widget = Layered(canvas)
+        begin = [
+            Begin("Empty scene", "Begin with nothing", "new", self._empty),
+            Begin("Open…", "Open a project", "open", files.choose),
+            Begin("Load environment…", "Light from an HDR picture", "environment", load_environment),
+        ]
+        self.start_page = StartPage(context, files.recent, samples, files.open, files.open_copy, begin)
+        self.notices = Notices(context.journal)
+        self.read_only = ReadOnlyBar(files)
+        self.widget.fill(self.start_page)
+        self.widget.bar(self.read_only)
+        self.widget.bar(self.notices)
+        self._subscriptions = Subscriptions()
+        self._subscriptions.add(files.opened.connect(self._opened))
+
+    def set_theme(self, theme: Theme) -> None:
+        """Colours and icons."""
+        self.start_page.set_theme(theme)
+        self.notices.set_theme(theme)
+
+    def close(self) -> None:
+        """Stop following."""
+        self._subscriptions.close()
+        self.start_page.close_panel()
+        self.notices.close_panel()
+        self.read_only.close_panel()
+
+    def _empty(self) -> None:
+        """The bare canvas, until another document is opened."""
+        self.start_page.dismiss()
+        self.widget.setFocus()
+
+    def _opened(self) -> None:
+        self.notices.clear()
+        self.start_page.open_again()
