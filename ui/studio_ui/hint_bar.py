@@ -29,7 +29,7 @@ class HintBar(QFrame):
         self.setObjectName("hints")
         self.setFixedHeight(_HEIGHT)
         self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)  # a text resizes no picture
-        self._settings = settings
+        self._settings, self._document = settings, context.document
         self._done: set[Aspect] = set()
         self._labels = [QLabel() for _ in STEPS]
         layout = QHBoxLayout(self)
@@ -46,7 +46,7 @@ class HintBar(QFrame):
         self._subscriptions = Subscriptions()
         self._subscriptions.add(context.editing.document.changed.connect(self._edited))
         self._write()
-        self.setVisible(not settings.get("hinted", False))
+        self.setVisible(self._wanted())
 
     def dismiss(self) -> None:
         """Never show them again."""
@@ -61,7 +61,13 @@ class HintBar(QFrame):
         """The icon in the theme's colour."""
         self._close.setIcon(icon("cancel", theme.dim))
 
+    def _wanted(self) -> bool:
+        """There is something to try it on, and not everything was tried."""
+        return bool(self._document.scene.nodes) and not self._settings.get("hinted", False)
+
     def _edited(self, before: Scene, after: Scene, changes: Changes) -> None:
+        if self.isHidden() == self._wanted():
+            self.setVisible(self._wanted())
         if not before.nodes or changes.aspects & Aspect.STRUCTURE:
             return  # another project, or something new in this one
         done = {aspect for aspect, _ in STEPS if changes.aspects & aspect}

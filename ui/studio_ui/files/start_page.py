@@ -92,9 +92,8 @@ class StartPage(QWidget):
     def refresh(self) -> None:
         """Show the page if the scene is empty."""
         empty = not self._context.document.scene.nodes and not self._dismissed
-        if empty != self.isHidden():
-            return
-        self.setVisible(empty)
+        if empty == self.isHidden():
+            self.setVisible(empty)
         if empty:
             self._recent.refresh()
 
