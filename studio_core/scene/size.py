@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import numpy.typing as npt
 
 from studio_core.contract import ImportedModel
-from studio_core.scene.nodes import Scene
+from studio_core.scene.nodes import MeshObject, NodeId, Scene
+from studio_core.scene.transform import Transform, rotation_matrix, vec3
 
 LARGEST, SMALLEST = 30.0, 0.02
 """Metres between which the longest side of furniture and rooms lies."""
@@ -30,6 +33,50 @@ def model_size(model: ImportedModel) -> tuple[float, float, float]:
     low, high = model_bounds(model)
     width, height, depth = (float(side) for side in high - low)
     return width, depth, height
+
+
+def own_box(scene: Scene, node: NodeId) -> npt.NDArray[np.float64] | None:
+    """(2, 3) lowest and highest corner of what hangs under a node, in its own frame; None without a mesh.
+
+    A thing that was turned is as wide as before: width is along its own x.
+    """
+    local = scene.world(node).inverse()
+    corners = []
+    for below in scene.subtree(node):
+        mesh = scene[below]
+        if isinstance(mesh, MeshObject) and len(mesh.geometry.positions):
+            matrix = (local @ scene.world(below)).matrix()
+            low, high = mesh.geometry.bounds
+            box = np.array(np.meshgrid(*zip(low, high, strict=True))).reshape(3, -1).T
+            corners.append(box @ matrix[:3, :3].T + matrix[:3, 3])
+    if not corners:
+        return None
+    points = np.concatenate(corners)
+    return np.stack([points.min(axis=0), points.max(axis=0)])
+
+
+def own_size(scene: Scene, node: NodeId) -> tuple[float, float, float] | None:
+    """Width, depth and height of a node along its own axes, metres in the world; None without a mesh."""
+    box = own_box(scene, node)
+    if box is None:
+        return None
+    width, height, depth = (float(side) for side in (box[1] - box[0]) * scene.world(node).scale)
+    return width, depth, height
+
+
+def resized(scene: Scene, node: NodeId, factor: float) -> Transform:
+    """The node's transform once it is `factor` times as large about the middle of its base.
+
+    What stands on the floor goes on standing there. ValueError when the factor is not positive.
+    """
+    old = scene[node].transform
+    made = dataclasses.replace(old, scale=old.scale * factor)
+    box = own_box(scene, node)
+    if box is None:
+        return made
+    base = np.array([(box[0, 0] + box[1, 0]) / 2, box[0, 1], (box[0, 2] + box[1, 2]) / 2])
+    shift = (old.scale - made.scale) * (rotation_matrix(old.rotation) @ base)
+    return dataclasses.replace(made, translation=vec3(np.array(old.translation) + shift))
 
 
 def suspicious_size(model: ImportedModel) -> str | None:

@@ -105,18 +105,19 @@ def test_materials_are_made_assigned_and_deleted(driver: Driver) -> None:
 def test_a_choice_in_the_picture_shows_its_properties(driver: Driver) -> None:
     panel = driver.window.panels["properties"]
     driver.session.select(["stool"])
-    driver.until(lambda: panel.node == "stool")
-    assert [spin.value() for spin in panel.position.spins] == [1.0, 0.0, 0.0]
-    panel.position.spins[0].setValue(1.5)
-    panel.rotation.spins[1].setValue(90)
-    panel.scale.setValue(2)
+    driver.until(lambda: panel.nodes == ("stool",))
+    place = panel.place
+    assert [spin.value() for spin in place.position.spins] == [1.0, 0.0, 0.0]
+    place.position.spins[0].setValue(1.5)
+    place.rotation.spins[1].setValue(90)
+    place.scale.spins[0].setValue(2)
     world = driver.document.scene.world("stool")
     assert world.translation == (1.5, 0.0, 0.0)
     assert world.scale == 2
     assert world.matrix()[:3, 0] == pytest.approx((0, 0, -2), abs=1e-6)
     assert driver.labels()[1:] == ["Move Stool", "Turn Stool", "Scale Stool"]
-    driver.until(lambda: panel._size.text() == "2.00 × 2.00 × 2.00")
-    combo = panel._slots[0]
+    driver.until(lambda: [spin.value() for spin in place.size.spins] == [2.0, 2.0, 2.0])
+    combo = panel.slots[0]
     combo.setCurrentIndex(combo.findData("red"))
     combo.activated.emit(combo.currentIndex())
     assert driver.document.scene["stool"].materials == ("red",)

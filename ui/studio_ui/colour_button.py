@@ -45,6 +45,7 @@ class ColourButton(QAbstractButton):
         self._title, self._reflectance = title, reflectance
         self._colour: Colour = (0.0, 0.0, 0.0)
         self._peak = 1.0
+        self._mixed = False
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setCursor(Qt.CursorShape.PointingHandCursor)
@@ -55,13 +56,17 @@ class ColourButton(QAbstractButton):
         """What is shown, linear."""
         return self._colour
 
-    def show_colour(self, colour: Colour) -> None:
-        """Another colour."""
+    def show_colour(self, colour: Colour, *, mixed: bool = False) -> None:
+        """Another colour; `mixed`: one of several."""
+        self._mixed = mixed
         red, green, blue = (float(c) for c in colour)
         self._colour = (red, green, blue)
         what = "Reflects" if self._reflectance else "Factor"
-        numbers = " / ".join(f"{c:.3f}" for c in self._colour)
-        self.setToolTip(f"{what} {numbers} (linear)\nShown as {to_display(self._colour).name()} (sRGB)")
+        numbers = " / ".join(f"{c:.3f}" for c in self._colour) if not mixed else "—"
+        if mixed:
+            self.setToolTip("Several colours; a click gives all of them one")
+        else:
+            self.setToolTip(f"{what} {numbers} (linear)\nShown as {to_display(self._colour).name()} (sRGB)")
         self.setAccessibleName(f"{self._title} {numbers}")
         self.update()
 
@@ -98,9 +103,13 @@ class ColourButton(QAbstractButton):
         colour = to_display(self._colour)
         border = self.palette().highlight().color() if self.hasFocus() else QColor(0, 0, 0, 90)
         painter.setPen(QPen(border, 1))
-        painter.setBrush(colour if self.isEnabled() else self.palette().window())
+        shown = self.isEnabled() and not self._mixed
+        painter.setBrush(colour if shown else self.palette().window())
         painter.drawRoundedRect(QRectF(self.rect()).adjusted(0.5, 1.5, -0.5, -1.5), 4, 4)
-        if self.width() > 110:
+        if self._mixed:
+            painter.setPen(self.palette().text().color())
+            painter.drawText(self.rect(), int(Qt.AlignmentFlag.AlignCenter), "—")
+        elif self.width() > 110:
             painter.setPen(QColor("#1c1c1c" if colour.lightnessF() > 0.5 else "#f2f2f0"))
             text = " ".join(f"{c:.2f}" for c in self._colour)
             painter.drawText(self.rect(), int(Qt.AlignmentFlag.AlignCenter), text)

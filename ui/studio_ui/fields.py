@@ -14,13 +14,14 @@ from PySide6.QtWidgets import (
     QLineEdit,
     QSizePolicy,
     QSlider,
+    QVBoxLayout,
     QWidget,
 )
 
 from studio_core.params import ParamInfo
 from studio_ui.colour_button import ColourButton
 from studio_ui.sinks import Sink
-from studio_ui.spin import Spin
+from studio_ui.spin import MIXED, Spin
 from studio_ui.theme import GAP
 
 _STEPS = 1000
@@ -55,12 +56,19 @@ class Field(QWidget):
         super().__init__()
         self.name, self.info, self.sink = name, info, sink
         self.setToolTip(tip(info))
-        self.row = QHBoxLayout(self)
-        self.row.setContentsMargins(0, 0, 0, 0)
+        self.column = QVBoxLayout(self)
+        self.column.setContentsMargins(0, 0, 0, 0)
+        self.column.setSpacing(2)
+        self.row = QHBoxLayout()
         self.row.setSpacing(GAP)
+        self.column.addLayout(self.row)
 
     def show_value(self, value: Any) -> None:
         """What the scene has."""
+        raise NotImplementedError
+
+    def show_mixed(self, value: Any) -> None:
+        """Several things have several values, the last of them `value`."""
         raise NotImplementedError
 
 
@@ -76,7 +84,7 @@ class NumberField(Field):
         low, high = slider_range(info)
         self._low, self._high = low, high
         if high > low:
-            self.slider = Slider(Qt.Orientation.Horizontal)
+            self.slider = self.make_slider()
             self.slider.setRange(0, _STEPS)
             self.slider.setFocusPolicy(Qt.FocusPolicy.NoFocus)
             self.slider.setAccessibleName(info.label)
@@ -91,14 +99,23 @@ class NumberField(Field):
         self.spin.let_go.connect(self._released)
         self.spin.dropped.connect(self._dropped)
 
+    def make_slider(self) -> Slider:
+        """The slider, where there is one."""
+        return Slider(Qt.Orientation.Horizontal)
+
     def show_value(self, value: Any) -> None:
         """What the scene has."""
         self._value = float(value)
-        with QSignalBlocker(self.spin):
-            self.spin.setValue(self._value)
+        self.spin.show_value(self._value)
         if self.slider is not None and not self.slider.isSliderDown():
             with QSignalBlocker(self.slider):
                 self.slider.setValue(round(_STEPS * self._share(self._value)))
+
+    def show_mixed(self, value: Any) -> None:
+        """A dash; the slider is where the last one is."""
+        self.show_value(value)
+        self._value = math.inf  # whatever is typed is another value
+        self.spin.show_mixed(float(value))
 
     def _share(self, value: float) -> float:
         value = min(max(value, self._low), self._high)
@@ -122,8 +139,7 @@ class NumberField(Field):
 
     def _slid(self, step: int) -> None:
         value = self._at(step / _STEPS)
-        with QSignalBlocker(self.spin):
-            self.spin.setValue(value)
+        self.spin.show_value(value)
         if self._gesture:
             self.sink.preview(self.name, value)
         elif self.slider is not None and not self.slider.isSliderDown():
@@ -142,7 +158,7 @@ class NumberField(Field):
     def _typed(self, value: float) -> None:
         if abs(value - self._value) < 0.5 * 10.0 ** -self.spin.decimals():
             return  # only rounded
-        self._value = value
+        self._value, self.spin.mixed = value, False
         given = round(value) if self.info.kind == "integer" else value
         if self._gesture:
             self.sink.preview(self.name, given)
@@ -159,12 +175,22 @@ class FlagField(Field):
         self.box.setAccessibleName(info.label)
         self.row.addWidget(self.box)
         self.row.addStretch(1)
-        self.box.toggled.connect(lambda on: self.sink.apply(self.name, on))
+        self.box.checkStateChanged.connect(self._turned)
 
     def show_value(self, value: Any) -> None:
         """What the scene has."""
         with QSignalBlocker(self.box):
+            self.box.setTristate(False)
             self.box.setChecked(bool(value))
+
+    def show_mixed(self, value: Any) -> None:
+        """Half checked."""
+        with QSignalBlocker(self.box):
+            self.box.setCheckState(Qt.CheckState.PartiallyChecked)
+
+    def _turned(self, state: Qt.CheckState) -> None:
+        self.box.setTristate(False)
+        self.sink.apply(self.name, state is Qt.CheckState.Checked)
 
 
 class ChoiceField(Field):
@@ -183,6 +209,12 @@ class ChoiceField(Field):
         with QSignalBlocker(self.combo):
             self.combo.setCurrentText(str(value))
 
+    def show_mixed(self, value: Any) -> None:
+        """A dash."""
+        with QSignalBlocker(self.combo):
+            self.combo.setPlaceholderText(MIXED)
+            self.combo.setCurrentIndex(-1)
+
 
 class TextField(Field):
     """A line of text."""
@@ -199,7 +231,15 @@ class TextField(Field):
         """What the scene has."""
         if str(value) != self._value or not self.edit.hasFocus():
             self._value = str(value)
+            self.edit.setPlaceholderText("")
             self.edit.setText(self._value)
+
+    def show_mixed(self, value: Any) -> None:
+        """A dash; nothing typed leaves all as they are."""
+        if not self.edit.hasFocus() or self._value:
+            self._value = ""
+            self.edit.clear()
+            self.edit.setPlaceholderText(MIXED)
 
     def _typed(self) -> None:
         if self.edit.text() != self._value:
@@ -222,6 +262,10 @@ class ColourField(Field):
     def show_value(self, value: Any) -> None:
         """What the scene has."""
         self.button.show_colour(value)
+
+    def show_mixed(self, value: Any) -> None:
+        """A dash; the dialog starts from the last."""
+        self.button.show_colour(value, mixed=True)
 
 
 FIELDS: dict[str, type[Field]] = {

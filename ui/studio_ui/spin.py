@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 
-from PySide6.QtCore import QPoint, Qt, Signal
+from PySide6.QtCore import QPoint, QSignalBlocker, Qt, Signal
 from PySide6.QtGui import QFocusEvent, QKeyEvent, QMouseEvent, QShowEvent, QValidator, QWheelEvent
 from PySide6.QtWidgets import QApplication, QDoubleSpinBox, QLabel, QToolTip, QWidget
 
@@ -16,6 +16,8 @@ from studio_core.errors import InputError
 from studio_core.params import ParamInfo
 from studio_ui.number_style import NumberStyle, number_style
 
+MIXED = "—"
+"""Shown where several things are edited at once and differ."""
 _WIDEST = 1e9
 _PRECISION = 9  # decimals of the value itself; what is shown has fewer
 _NOTCH = 120  # of a mouse wheel
@@ -39,6 +41,7 @@ class Spin(QDoubleSpinBox):
     dropped = Signal()
 
     def __init__(self, info: ParamInfo | None = None, *, decimals: int = 3, show_unit: bool = True) -> None:
+        self.mixed = self._edited = False
         super().__init__()
         self.info = info or ParamInfo("number", "")
         self._whole = self.info.kind == "integer"
@@ -56,11 +59,37 @@ class Spin(QDoubleSpinBox):
         self.setMinimumWidth(58)
         if self.info.label:
             self.setAccessibleName(self.info.label)
+        self.lineEdit().textEdited.connect(self._typing)
+        self.editingFinished.connect(self._finished)
+
+    def show_value(self, value: float) -> None:
+        """Without telling."""
+        self.mixed = False
+        with QSignalBlocker(self):
+            self.setValue(value)
+
+    def show_mixed(self, value: float) -> None:
+        """Several values, without telling; steps start from `value`."""
+        self.mixed = True
+        with QSignalBlocker(self):
+            self.setValue(value)
+
+    def _typing(self, text: str) -> None:
+        self._edited = any(sign.isdigit() for sign in text)
+
+    def _finished(self) -> None:
+        """A number that was typed over several values counts, also when it is what one of them was."""
+        edited, self._edited = self._edited, False
+        if self.mixed and edited:
+            self.mixed = False
+            self.valueChanged.emit(self.value())
 
     # text
 
     def textFromValue(self, value: float) -> str:
         """In the window's unit and with its decimal mark."""
+        if self.mixed:
+            return MIXED
         return self._style.text(value, self.info.unit, self._shown, with_unit=self._show_unit)
 
     def valueFromText(self, text: str) -> float:
@@ -75,6 +104,8 @@ class Spin(QDoubleSpinBox):
 
     def validate(self, text: str, at: int) -> object:
         """Anything may be typed; what cannot be read is not taken."""
+        if self.mixed and text == MIXED:
+            return QValidator.State.Acceptable, text, at
         try:
             self._style.read(text, self.info.unit)
         except InputError:

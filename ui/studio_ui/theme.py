@@ -79,6 +79,7 @@ QToolButton { border: 1px solid transparent; border-radius: 4px; padding: 4px; }
 QToolButton:hover { background: $raised; }
 QToolButton:pressed, QToolButton:checked { background: $accent; color: $on_accent; }
 QToolButton::menu-indicator { image: none; }
+QToolButton[role="small"] { padding: 1px; }
 QToolButton[role="fold"]:checked { background: transparent; color: $text; }
 QDockWidget { color: $dim; font-weight: 600; }
 QDockWidget::title { background: $window; padding: 6px 8px; border-bottom: 1px solid $border; }
@@ -108,6 +109,7 @@ QSpinBox::up-button, QSpinBox::down-button, QDoubleSpinBox::up-button, QDoubleSp
 QCheckBox::indicator { width: 14px; height: 14px; border: 1px solid $dim; border-radius: 3px;
     background: $base; }
 QCheckBox::indicator:checked { background: $accent; border-color: $accent; }
+QCheckBox::indicator:indeterminate { background: $dim; }
 QComboBox QAbstractItemView { background: $raised; border: 1px solid $border; outline: 0; }
 QPushButton { background: $raised; border: 1px solid $border; border-radius: 4px; padding: 5px 12px; }
 QPushButton:hover { border-color: $accent; }

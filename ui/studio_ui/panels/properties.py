@@ -1,91 +1,43 @@
-"""Properties of what is chosen: its place with units, its parameters from their metadata, its materials."""
+"""Properties of what is chosen, of one thing or of several at once: parameters, place, materials."""
 
 from __future__ import annotations
 
-import dataclasses
-import math
-from collections.abc import Callable
-
 from PySide6.QtCore import QSignalBlocker, QTimer
-from PySide6.QtWidgets import QHBoxLayout, QLabel, QWidget
+from PySide6.QtWidgets import QWidget
 
-from studio_core.edits import Assign, Edit, Move, SetFields
+from studio_core.edits import Assign, Compound, Edit, SetFields
 from studio_core.params import ParamInfo, Value, param_infos
 from studio_core.scene.diff import Changes
-from studio_core.scene.nodes import Camera, Environment, Light, MeshObject, Node, NodeId, Scene
-from studio_core.scene.transform import Transform
-from studio_ui.canvas.projection import bounds
+from studio_core.scene.nodes import Environment, MaterialId, MeshObject, Node, NodeId, Scene
 from studio_ui.context import Context
-from studio_ui.euler import from_euler, to_euler
-from studio_ui.fields import Combo, Spin
+from studio_ui.fields import Combo
+from studio_ui.panels.light_form import NodeForm, shared_values
+from studio_ui.panels.node_kinds import kinds_name
 from studio_ui.panels.panel import Panel, clear, heading, note
+from studio_ui.panels.place import PlaceEditor
 from studio_ui.param_form import ParamForm, form_label, form_layout
 from studio_ui.sinks import EditSink
+from studio_ui.spin import MIXED
 
-_POSITION = ParamInfo("number", "Position", "Metres from the parent's origin", unit="m", low=-1e6, high=1e6)
-_ANGLE = ParamInfo(
-    "number", "Rotation", "Tilt about x, turn about y, roll about z", unit="°", low=-3600, high=3600
-)
-_SCALE = ParamInfo("number", "Scale", "Uniform", low=1e-6, high=1e6, scale="log")
-KINDS = {
-    "Group": "Group",
-    "MeshObject": "Object",
-    "Camera": "Camera",
-    "Environment": "Environment",
-    "PointLamp": "Point lamp",
-    "SpotLamp": "Spot lamp",
-    "DirectionalLamp": "Sun",
-    "AreaLamp": "Area lamp",
-}
-
-
-class Triple(QWidget):
-    """Three numbers of one kind."""
-
-    def __init__(self, info: ParamInfo, typed: Callable[[int, float], object]) -> None:
-        super().__init__()
-        self.spins = [Spin(dataclasses.replace(info, unit="")) for _ in range(3)]
-        self._values = [0.0, 0.0, 0.0]
-        layout = QHBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.setSpacing(3)
-        for index, (spin, axis) in enumerate(zip(self.spins, "xyz", strict=True)):
-            spin.setMinimumWidth(44)
-            spin.setToolTip(f"{axis}: {info.doc}{f' ({info.unit})' if info.unit else ''}")
-            spin.setAccessibleName(f"{info.label} {axis}")
-            spin.setSingleStep(1 if info.unit == "°" else 0.05)
-            spin.valueChanged.connect(lambda value, i=index: self._told(i, value, typed))
-            layout.addWidget(spin, 1)
-
-    def show_values(self, values: tuple[float, float, float]) -> None:
-        """Without telling."""
-        self._values = list(values)
-        for spin, value in zip(self.spins, values, strict=True):
-            with QSignalBlocker(spin):
-                spin.setValue(value)
-
-    def _told(self, index: int, value: float, typed: Callable[[int, float], object]) -> None:
-        if abs(value - self._values[index]) >= 0.5 * 10.0 ** -self.spins[index].decimals():
-            typed(index, value)
+_FLAGS = ("hidden", "locked")
+_MOST = 200  # things whose values are compared; of more, the first ones
 
 
 class PropertiesPanel(Panel):
-    """Follows the last chosen node; rebuilt when that is another one."""
+    """Follows the choice; built anew when other kinds of things are chosen."""
 
     id = "properties"
     title = "Properties"
 
     def __init__(self, context: Context) -> None:
         super().__init__(context)
-        self.node: NodeId | None = None
-        self._sink = EditSink(context.editing, self._set, self._label)
-        self.form: ParamForm | None = None
-        self.position: Triple | None = None
-        self.rotation: Triple | None = None
-        self.scale: Spin | None = None
-        self._size = QLabel()
-        self._slots: list[Combo] = []
-        self._materials: tuple[tuple[str, str], ...] = ()
+        self.nodes: tuple[NodeId, ...] = ()
+        self._sink = EditSink(context.editing, self._make, self._label)
+        self.form: NodeForm | None = None
+        self.flags: ParamForm | None = None
+        self.place: PlaceEditor | None = None
+        self.slots: list[Combo] = []
+        self._built: object = self
         self._column = self.scroller()
         self._soon = QTimer(self)
         self._soon.setSingleShot(True)
@@ -94,139 +46,126 @@ class PropertiesPanel(Panel):
             context.document.changed.connect(self._edited),
             context.session.selected.connect(lambda: self._soon.start(0)),
         )
-        self._build(None)
+        self.refresh()
 
     def refresh(self) -> None:
         """Show what is chosen as it is now."""
         scene = self.context.document.scene
-        chosen = [n for n in self.context.session.selection if n in scene.nodes]
-        node = chosen[-1] if chosen else None
-        slots = len(_slots_of(scene, node))
+        self.nodes = tuple(n for n in self.context.session.selection if n in scene.nodes)
+        nodes = [scene[n] for n in self.nodes]
         known = tuple((m.id, m.name) for m in scene.materials.values())
-        if node != self.node or slots != len(self._slots) or (slots and known != self._materials):
-            self._materials = known
-            self._build(node)
-        if node is not None:
-            self._fill(scene, scene[node])
+        meshes = [node for node in nodes if isinstance(node, MeshObject)]
+        slots = len(meshes[0].materials) if meshes else 0
+        if len({len(mesh.materials) for mesh in meshes}) > 1:
+            slots = 1  # one for all
+        key = (self.nodes, tuple(type(node) for node in nodes), slots, known if slots else ())
+        if key != self._built:
+            self._built = key
+            self._build(scene, nodes, slots)
+        if nodes:
+            self._fill(scene, nodes)
 
     def _edited(self, before: Scene, after: Scene, changes: Changes) -> None:
-        gone = self.node is not None and self.node not in after.nodes
-        if gone or changes.materials or (self.node in changes.nodes):
+        if changes.materials or any(n in changes.nodes or n not in after.nodes for n in self.nodes):
             self._soon.start(0)
 
-    def _build(self, node_id: NodeId | None) -> None:
+    def _build(self, scene: Scene, nodes: list[Node], slots: int) -> None:
         self._sink.commit()
         clear(self._column)
-        self.node, self.form = node_id, None
-        self.position = self.rotation = self.scale = None
-        self._slots = []
-        scene = self.context.document.scene
-        if node_id is None:
+        self.form = self.flags = self.place = None
+        self.slots = []
+        if not nodes:
             self._column.addWidget(note("Click something in the picture or the outliner to see what it is."))
             self._column.addStretch(1)
             return
-        node = scene[node_id]
-        chosen = self.context.session.selection
-        kind = KINDS.get(type(node).__name__, type(node).__name__)
-        self._column.addWidget(heading(kind))
-        if len(chosen) > 1:
-            self._column.addWidget(note(f"{len(chosen)} chosen; this is the last one."))
-        infos = param_infos(type(node))
-        self.form = ParamForm(infos, self._sink, skip=("hidden", "locked"))
+        self._column.addWidget(heading(kinds_name(nodes)))
+        if len(nodes) > 1:
+            self._column.addWidget(note(f"What is typed counts for all of them; {MIXED} where they differ."))
+        infos = _shared_infos(nodes)
+        self.form = NodeForm(type(nodes[-1]), infos, self._sink)
         self._column.addWidget(self.form)
-        if not isinstance(node, Environment):
-            self._place()
-        if isinstance(node, MeshObject):
-            self._mesh(scene, node)
-        flags = {name: infos[name] for name in ("hidden", "locked")}
-        self._flags = ParamForm(flags, self._sink)
-        self._column.addWidget(self._flags)
+        if not any(isinstance(node, Environment) for node in nodes):
+            self._column.addWidget(heading("Place"))
+            self.place = PlaceEditor(self.context)
+            self._column.addWidget(self.place)
+        if slots:
+            self._column.addWidget(heading("Materials"))
+            self._column.addWidget(self._materials(scene, nodes, slots))
+        self.flags = ParamForm({name: infos[name] for name in _FLAGS}, self._sink)
+        self._column.addWidget(self.flags)
         self._column.addStretch(1)
 
-    def _place(self) -> None:
-        self._column.addWidget(heading("Place"))
+    def _materials(self, scene: Scene, nodes: list[Node], slots: int) -> QWidget:
         box = QWidget()
         layout = form_layout(box)
-        self.position = Triple(_POSITION, lambda i, v: self._move(0, i, v))
-        self.rotation = Triple(_ANGLE, lambda i, v: self._move(1, i, v))
-        self.scale = Spin(_SCALE)
-        self.scale.valueChanged.connect(lambda value: self._move(2, 0, value))
-        self._size = QLabel()
-        layout.addRow(form_label("Position (m)", _POSITION.doc), self.position)
-        layout.addRow(form_label("Rotation (°)", _ANGLE.doc), self.rotation)
-        layout.addRow(form_label("Scale", _SCALE.doc), self.scale)
-        layout.addRow(form_label("Size (m)", "Width × depth × height of the box around it"), self._size)
-        self._column.addWidget(box)
-
-    def _mesh(self, scene: Scene, node: MeshObject) -> None:
-        self._column.addWidget(heading("Materials"))
-        box = QWidget()
-        layout = form_layout(box)
-        for index in range(len(node.materials)):
+        for index in range(slots):
             combo = Combo()
+            combo.setPlaceholderText(MIXED)
+            combo.setAccessibleName(f"Material {index + 1}")
             for material in scene.materials.values():
                 combo.addItem(material.name, material.id)
             combo.activated.connect(lambda _, i=index: self._assign(i))
-            layout.addRow(form_label(f"Slot {index + 1}" if len(node.materials) > 1 else "Material"), combo)
-            self._slots.append(combo)
-        shared = sum(1 for other in scene.of(MeshObject) if other.geometry is node.geometry)
-        told = f"{len(node.geometry.faces):,} triangles"
-        layout.addRow(note(told if shared < 2 else f"{told}, shared by {shared} objects"))
-        self._column.addWidget(box)
+            layout.addRow(form_label(f"Slot {index + 1}" if slots > 1 else "Material"), combo)
+            self.slots.append(combo)
+        meshes = [node for node in nodes if isinstance(node, MeshObject)]
+        told = f"{sum(len(mesh.geometry.faces) for mesh in meshes):,} triangles"
+        shared = sum(other.geometry is meshes[-1].geometry for other in scene.of(MeshObject))
+        if len(meshes) == 1 and shared > 1:
+            told += f", shared by {shared} objects"
+        layout.addRow(note(told))
+        return box
 
-    def _fill(self, scene: Scene, node: Node) -> None:
+    def _fill(self, scene: Scene, nodes: list[Node]) -> None:
         assert self.form is not None
-        values = {name: getattr(node, name) for name in param_infos(type(node))}
-        self.form.show_values(values)
-        self._flags.show_values(values)
-        if self.position is not None and self.rotation is not None and self.scale is not None:
-            self.position.show_values(node.transform.translation)
-            self.rotation.show_values(to_euler(node.transform.rotation))
-            with QSignalBlocker(self.scale):
-                self.scale.setValue(node.transform.scale)
-            found = None if isinstance(node, Camera | Light) else bounds(scene, (node.id,))
-            if found is not None:
-                width, height, depth = found[1] - found[0]
-                self._size.setText(f"{width:.2f} × {depth:.2f} × {height:.2f}")
-            else:
-                self._size.setText("–")
-        for combo, material in zip(self._slots, _slots_of(scene, node.id), strict=False):
-            combo.setCurrentIndex(combo.findData(material))
+        assert self.flags is not None
+        looked = nodes[-_MOST:]
+        self.form.show_nodes(scene, looked)
+        self.flags.show_values(*shared_values(looked, _FLAGS))
+        if self.place is not None:
+            self.place.show_nodes(scene, self.nodes)
+        meshes = [node for node in looked if isinstance(node, MeshObject)]
+        for index, combo in enumerate(self.slots):
+            there = {material for mesh in meshes for material in self._in_slot(mesh, index)}
+            with QSignalBlocker(combo):
+                combo.setCurrentIndex(combo.findData(next(iter(there))) if len(there) == 1 else -1)
 
-    def _set(self, name: str, value: Value) -> Edit:
-        assert self.node is not None
-        return SetFields(self.node, {name: value}, self._label(name))
+    def _in_slot(self, mesh: MeshObject, index: int) -> tuple[MaterialId, ...]:
+        return mesh.materials if len(self.slots) == 1 else mesh.materials[index : index + 1]
+
+    # edits
 
     def _label(self, name: str) -> str:
-        assert self.node is not None
-        node = self.context.document.scene[self.node]
-        return f"{param_infos(type(node))[name].label} of {node.name}"
+        scene = self.context.document.scene
+        nodes = [scene[n] for n in self.nodes if n in scene.nodes]
+        info: ParamInfo = param_infos(type(nodes[-1]))[name]
+        what = nodes[0].name if len(nodes) == 1 else kinds_name(nodes)
+        return f"{info.label} of {what}"
+
+    def _make(self, name: str, value: Value) -> Edit:
+        nodes = [n for n in self.nodes if n in self.context.document.scene.nodes]
+        if len(nodes) == 1:
+            return SetFields(nodes[0], {name: value}, self._label(name))
+        if name == "name":
+            edits = [SetFields(n, {name: f"{value} {i}"}) for i, n in enumerate(nodes, 1)]
+        else:
+            edits = [SetFields(n, {name: value}) for n in nodes]
+        return Compound(self._label(name), tuple(edits))
 
     def _assign(self, slot: int) -> None:
-        if self.node is not None:
-            self.context.editing.apply(Assign(self.node, self._slots[slot].currentData(), slot))
-
-    def _move(self, what: int, index: int, value: float) -> None:
-        if self.node is None or not math.isfinite(value):
-            return
-        node = self.context.document.scene[self.node]
-        old = node.transform
-        if what == 0:
-            place = list(old.translation)
-            place[index] = value
-            made = dataclasses.replace(old, translation=(place[0], place[1], place[2]))
-        elif what == 1:
-            angles = list(to_euler(old.rotation))
-            angles[index] = value
-            made = dataclasses.replace(old, rotation=from_euler((angles[0], angles[1], angles[2])))
-        elif abs(value - round(old.scale, 3)) >= 0.0005 and value > 0:
-            made = Transform(old.translation, old.rotation, value)
-        else:
-            return
-        verb = ("Move", "Turn", "Scale")[what]
-        self.context.editing.apply(Move({self.node: made}, f"{verb} {node.name}"))
+        scene = self.context.document.scene
+        material = self.slots[slot].currentData()
+        meshes = [scene[n] for n in self.nodes if isinstance(scene.nodes.get(n), MeshObject)]
+        one = None if len(self.slots) == 1 else slot
+        edits = tuple(Assign(mesh.id, material, one) for mesh in meshes)
+        what = meshes[0].name if len(meshes) == 1 else f"{len(meshes)} objects"
+        self.context.editing.apply(Compound(f"{scene.material(material).name} on {what}", edits))
 
 
-def _slots_of(scene: Scene, node: NodeId | None) -> tuple[str, ...]:
-    found = scene.nodes.get(node) if node is not None else None
-    return found.materials if isinstance(found, MeshObject) else ()
+def _shared_infos(nodes: list[Node]) -> dict[str, ParamInfo]:
+    """The parameters that all of them have, as the last one has them."""
+    kinds = [param_infos(kind) for kind in {type(node) for node in nodes}]
+    return {
+        name: info
+        for name, info in param_infos(type(nodes[-1])).items()
+        if all(name in kind for kind in kinds)
+    }
