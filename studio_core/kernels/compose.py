@@ -21,6 +21,8 @@ Bools = npt.NDArray[np.bool_]
 Colour = tuple[np.float32, np.float32, np.float32]
 
 CONSTANT, AFFINE, GENERAL = 0, 1, 2
+CAUGHT = 3
+"""What catches shadows, for canvases; kernels draw it by `caught_light`."""
 RECORD = 8
 """Floats of a vertex: two colours, u, v."""
 ROOT_TWO = 2**0.5

@@ -22,7 +22,7 @@ from studio_core.kernels.tonemap import KINDS, tonemap
 from studio_core.project.store import load
 from studio_core.scene.diff import diff
 from studio_core.scene.geometry import Geometry, Image, Texture
-from studio_core.scene.nodes import Camera, MeshObject, Scene
+from studio_core.scene.nodes import ON_THE_GROUND, Camera, Environment, MeshObject, Scene
 from studio_core.scene.shading_mesh import BUDGET, NO_BACK, ShadingMesh, refine
 from studio_core.scene.transform import Transform, looking
 from studio_core.session import View
@@ -62,12 +62,22 @@ def drawn(screen: Any, picture: Picture | None, view: View, **look: Any) -> np.n
         return screen.read()
 
 
+ROUGH = {"model": "ggx", "values": frozen_map({"base_color": (0.7, 0.5, 0.3), "roughness": 0.4})}
+
+
 def scene_of(*more: MeshObject, **paint: Any) -> Scene:
     """A floor, a cube and more, of which all but the floor are of a material with such fields."""
     scene = little_scene()
     scene = Move({"cube": Transform((0.0, 0.51, 0.0))})(scene)
     made = dataclasses.replace(scene.material("paint"), **paint)
     return Add(more)(scene.with_materials(made)) if more else scene.with_materials(made)
+
+
+def photographed(glass: float = 1.0, **sky: Any) -> Scene:
+    """A cube on a floor that catches shadows, and what is behind them."""
+    scene = scene_of(**ROUGH, opacity=glass)
+    scene = scene.with_materials(dataclasses.replace(scene.material("matt"), catches=True))
+    return scene.with_nodes(dataclasses.replace(scene["sky"], azimuth=30.0, **sky))
 
 
 def sheet(name: str, transform: Transform, material: str = "paint") -> MeshObject:
@@ -94,7 +104,6 @@ def blade() -> Geometry:
 
 
 BLADE = MeshObject(id="blade", name="Blade", geometry=blade(), materials=("paint",))
-ROUGH = {"model": "ggx", "values": frozen_map({"base_color": (0.7, 0.5, 0.3), "roughness": 0.4})}
 COLOURED = {"model": "ggx", "textures": frozen_map({"base_color": Texture(PICTURE, (3.0, 2.0), (0.2, 0.7))})}
 FINE = {"textures": frozen_map({"base_color": Texture(PICTURE, (40.0, -25.0))})}
 METAL = {
@@ -113,6 +122,12 @@ SCENES = {
         little_scene()
     ),
     "no sky": SetFields("sky", {"background": False})(little_scene()),
+    "floor of a photograph": photographed(background_azimuth=40.0),
+    "floor of a photograph on the ground": photographed(
+        projection=ON_THE_GROUND, ground_radius=3.0, transform=Transform((0.3, -0.1, 0.2))
+    ),
+    "floor of a photograph behind glass": Add(sheets(3))(photographed(glass=0.35, projection=ON_THE_GROUND)),
+    "floor without a photograph": photographed(background=False),
     "far from the origin": Move(
         {
             "floor": Transform((5000.0, 30.0, -8000.0)),
@@ -135,9 +150,22 @@ def test_both_canvases_show_the_same(name: str, kind: str, screen: Any, painter:
     assert agreement(made, wanted, edges(picture)) >= 0.99
 
 
+def in_a_photograph(scene: Scene) -> Scene:
+    """A room whose floor is the photograph's."""
+    floors = [n for n in scene.of(MeshObject) if n.name == "Floor"]
+    assert floors
+    catching = [dataclasses.replace(scene.material(m), catches=True) for n in floors for m in n.materials]
+    sky = dataclasses.replace(next(scene.of(Environment)), projection=ON_THE_GROUND, background=True)
+    return scene.with_materials(*catching).with_nodes(sky)
+
+
 @pytest.mark.slow
-def test_both_canvases_show_the_same_sample_room(screen: Any, host: Any, workers: Any) -> None:
+@pytest.mark.parametrize("photographed", [False, True])
+def test_both_canvases_show_the_same_sample_room(
+    screen: Any, host: Any, workers: Any, photographed: bool
+) -> None:
     scene = load(sample()).scene
+    scene = in_a_photograph(scene) if photographed else scene
     cameras = list(scene.of(Camera))
     assert len(cameras) >= 3
     painter = Painter(Services(workers, host), vertices=BUDGET)

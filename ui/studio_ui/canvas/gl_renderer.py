@@ -16,9 +16,8 @@ import numpy as np
 import numpy.typing as npt
 from vispy import gloo
 
-from studio_core.kernels.compose import AFFINE, CONSTANT, GENERAL
+from studio_core.kernels.compose import AFFINE, CAUGHT, CONSTANT, GENERAL
 from studio_core.scene.nodes import NodeId
-from studio_core.scene.transform import rotation_matrix
 from studio_core.session import View
 from studio_core.shading.artifacts import Picture
 from studio_core.shading.coefficients import LEVELS
@@ -26,8 +25,9 @@ from studio_core.shading.primary import LAYERS
 from studio_ui.canvas import gl_shaders as shaders
 from studio_ui.canvas.gl_buffers import Tally
 from studio_ui.canvas.gl_camera import Camera
-from studio_ui.canvas.gl_maps import picture as texture_of
 from studio_ui.canvas.gl_scene import Batch, Body, GlScene
+from studio_ui.canvas.gl_sky import Sky
+from studio_ui.canvas.gl_sky_shaders import BACKDROP_FRAGMENT
 from studio_ui.canvas.gl_still import Still
 from studio_ui.canvas.gl_target import Target, Targets
 from studio_ui.canvas.projection import axes_of, extent
@@ -71,11 +71,10 @@ class Renderer:
     def __init__(self, largest_texture: int = 8192) -> None:
         self.tally = Tally()
         self.scene = GlScene(self.tally, largest_texture)
-        self._largest = largest_texture
         self._targets = Targets()
         self._programs: dict[object, Any] = {}
         self._corners = gloo.VertexBuffer(CORNERS)
-        self._sky: tuple[F32, Any, tuple[int, int]] | None = None
+        self._sky = Sky(self.tally, largest_texture)
         self._still = Still(self.tally)
         self._picture: Picture | None = None
         self._nearest = 1.0
@@ -93,7 +92,7 @@ class Renderer:
         else:
             self._still.clear()
             self.scene.show(picture)
-            self._follow_sky(picture)
+            self._sky.follow(picture)
         if picture is not None and picture.distance.size:
             self._nearest = float(picture.distance.min())
 
@@ -153,9 +152,10 @@ class Renderer:
         for kind in (CONSTANT, AFFINE, GENERAL):
             for peeled in (False, True):
                 self._program((kind, peeled), *shaders.mesh_program(kind, peeled, LEVELS))
+        self._program((CAUGHT, False), *shaders.mesh_program(CAUGHT, False, LEVELS))
         self._program("plain", *shaders.plain_program(shaders.PLAIN_FRAGMENT))
         self._program("layer", *shaders.plain_program(shaders.LAYER_FRAGMENT))
-        self._program("backdrop", shaders.SCREEN_VERTEX, shaders.BACKDROP_FRAGMENT)
+        self._program("backdrop", shaders.SCREEN_VERTEX, BACKDROP_FRAGMENT)
         self._program("still", shaders.SCREEN_VERTEX, shaders.STILL_FRAGMENT)
         self._program("display", *shaders.display_program())
         canvas = gloo.get_current_canvas()
@@ -168,9 +168,7 @@ class Renderer:
         self.scene.clear()
         self._still.clear()
         self._targets.delete()
-        if self._sky is not None:
-            self._sky[1].delete()
-            self._sky = None
+        self._sky.clear()
         self._corners.delete()
         for program in self._programs.values():
             program.delete()
@@ -187,17 +185,21 @@ class Renderer:
     def _mesh(self, look: Look, camera: Camera, gain: float, clear: bool, layer: Target | None) -> None:
         """All batches of one sort, by kind of coefficients."""
         own = list(self.scene.draws(clear))
-        for kind in (CONSTANT, AFFINE, GENERAL):
+        for kind in (CONSTANT, AFFINE, CAUGHT, GENERAL):
             batches = [(body, batch) for _, body, batch in own if batch.kind == kind]
             if not batches:
                 continue
+            if kind == CAUGHT and self._sky.backdrop is None:
+                kind = CONSTANT  # there is no photograph: it is as black as it is by itself
             sources = shaders.mesh_program(kind, layer is not None, LEVELS)
             program = self._program((kind, layer is not None), *sources)
             program["u_projection"] = camera.projection.T
             program["u_gain"] = gain
             if layer is not None:
                 program["u_layer"], program["u_size"] = layer.texture, layer.size
-            if kind != CONSTANT:
+            if kind == CAUGHT:
+                self._sky.under(program, look.view)
+            elif kind != CONSTANT:
                 rows = look.view.height * look.samples
                 program["u_pixel_angle"] = float(2 * np.tan(np.radians(look.view.fov) / 2) / rows)
             for body, batch in batches:
@@ -210,6 +212,8 @@ class Renderer:
     def _dress(self, program: Any, body: Body, batch: Batch) -> None:
         """A batch's light and maps."""
         program["a_plain"] = body.plain.buffer
+        if batch.kind == CAUGHT and self._sky.backdrop is not None:
+            program["a_slope"] = body.slope.buffer
         atlas = batch.atlas
         if atlas is None:
             return
@@ -233,17 +237,10 @@ class Renderer:
         gloo.set_state(cull_face=batch.culled)
 
     def _backdrop(self, look: Look, gain: float) -> None:
-        colours = self._picture.colours if self._picture is not None else None
-        if self._sky is None or colours is None or colours.backdrop is None:
+        if self._sky.backdrop is None:
             return
-        backdrop = colours.backdrop
-        program = self._program("backdrop", shaders.SCREEN_VERTEX, shaders.BACKDROP_FRAGMENT)
-        turn = backdrop.turn.astype(np.float64) @ rotation_matrix(look.view.transform.rotation)
-        program["u_sky"] = self._sky[1]
-        program["u_sky_size"] = self._sky[2]
-        program["u_turn"] = turn.T.astype(np.float32)
-        program["u_extent"] = extent(look.view)
-        program["u_light"] = (gain * backdrop.gain).astype(np.float32)
+        program = self._program("backdrop", shaders.SCREEN_VERTEX, BACKDROP_FRAGMENT)
+        self._sky.behind(program, look.view, gain)
         gloo.set_state(depth_test=True, depth_func="lequal", cull_face=False)
         self._fill(program)
 
@@ -352,21 +349,6 @@ class Renderer:
         if name not in self._programs:
             self._programs[name] = gloo.Program(vertex.strip(), fragment.strip())
         return self._programs[name]
-
-    def _follow_sky(self, picture: Picture) -> None:
-        backdrop = picture.colours.backdrop if picture.colours is not None else None
-        pixels = backdrop.pixels if backdrop is not None else None
-        if self._sky is not None and self._sky[0] is pixels:
-            return
-        if self._sky is not None:
-            self._sky[1].delete()
-            self._sky = None
-        if pixels is not None:
-            step = -(-max(pixels.shape[:2]) // self._largest)
-            shown = pixels[::step, ::step]  # no driver has larger ones
-            self._sky = (pixels, texture_of(shown, "rgb32f"), (shown.shape[1], shown.shape[0]))
-            self.tally.maps += shown.nbytes
-            self.tally.uploads += 1
 
     def _near_far(self, view: View) -> tuple[float, float]:
         """Depths between which everything lies; the nearest of the last picture, and some room."""

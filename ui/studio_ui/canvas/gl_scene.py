@@ -10,17 +10,19 @@ import numpy as np
 import numpy.typing as npt
 from vispy import gloo
 
-from studio_core.kernels.compose import AFFINE, CONSTANT, GENERAL
+from studio_core.kernels.compose import AFFINE, CAUGHT, CONSTANT, GENERAL
 from studio_core.scene.nodes import NodeId
 from studio_core.scene.shading_mesh import NO_BACK, ShadingMesh
 from studio_core.scene.transform import IDENTITY, Transform
-from studio_core.shading.artifacts import Picture
+from studio_core.shading.artifacts import Picture, Surfaces
+from studio_core.shading.coefficients import Maps
 from studio_ui.canvas.gl_buffers import GROWTH, Attribute, Tally
 from studio_ui.canvas.gl_maps import Atlas, Atlases
 
 F32 = npt.NDArray[np.float32]
 F64 = npt.NDArray[np.float64]
 U32 = npt.NDArray[np.uint32]
+NO_LIGHT, OPEN = np.zeros(3, np.float32), np.ones(3, np.float32)
 KEPT = 3
 """Lists of faces that a shape keeps: refined meshes and unrefined ones take turns."""
 
@@ -171,7 +173,7 @@ class GlScene:
         mesh, maps = shape.mesh, colours.maps
         materials = surfaces.mesh.face_material[surfaces.mesh.faces_of(index)]
         used = np.unique(materials).tolist()
-        looks = {m: self._look(maps.kind, maps.uv_scale, surfaces.opacity, m) for m in used}
+        looks = {m: self._look(maps, surfaces, m) for m in used}
         key = (id(mesh), *((m, looks[m]) for m in used))
         if key in shape.lists:
             shape.lists[key] = found = shape.lists.pop(key)  # the newest is last
@@ -191,13 +193,16 @@ class GlScene:
         return tuple(made)
 
     def _look(
-        self, kind: npt.NDArray[np.int64], uv_scale: F32, opacity: F32, material: int
+        self, maps: Maps, surfaces: Surfaces, material: int
     ) -> tuple[int, Atlas | None, tuple[float, ...], float]:
-        own = int(kind[material]) if material >= 0 else CONSTANT
-        alpha = float(opacity[material]) if material >= 0 else 1.0
+        if material < 0:
+            return CONSTANT, None, (), 1.0
+        own, alpha = int(maps.kind[material]), float(surfaces.opacity[material])
+        if surfaces.catches[material]:
+            return CAUGHT, None, (), alpha
         if own == CONSTANT:
             return own, None, (), alpha
-        return own, self.atlases[material], tuple(uv_scale[material].tolist()), alpha
+        return own, self.atlases[material], tuple(maps.uv_scale[material].tolist()), alpha
 
     def _indices(self, faces: U32) -> Any:
         flat = np.ascontiguousarray(faces, np.uint32).reshape(-1)
@@ -212,7 +217,7 @@ class GlScene:
         kinds = {batch.kind for batch in body.batches}
         record, sums = colours.record[own], colours.sums[own]
         wanted = [(body.plain, record[:, 0:3])]
-        if AFFINE in kinds:
+        if kinds & {AFFINE, CAUGHT}:
             wanted.append((body.slope, record[:, 3:6]))
         if GENERAL in kinds:
             wanted += [(body.sums[k], sums[:, 3 * k : 3 * k + 3]) for k in range(3)]
@@ -222,9 +227,12 @@ class GlScene:
             for column in (column for _, values in wanted for column in values.T):
                 lit |= column != 0
             known = known & lit
+        typical = {body.plain: self._typical}
+        if CAUGHT in kinds:
+            typical = {body.plain: NO_LIGHT, body.slope: OPEN}
         for attribute, values in wanted:
             attribute.resize(body.shape.positions.room)
-            attribute.update(values, known, self._typical if attribute is body.plain else None)
+            attribute.update(values, known, typical.get(attribute))
 
 
 def _delete(body: Body) -> None:

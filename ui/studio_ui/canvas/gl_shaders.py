@@ -6,7 +6,8 @@ written, so that half floats keep their precision where the display shows it.
 
 from __future__ import annotations
 
-from studio_core.kernels.compose import AFFINE, GENERAL
+from studio_core.kernels.compose import AFFINE, CAUGHT, GENERAL
+from studio_ui.canvas.gl_sky_shaders import SKY
 from studio_ui.canvas.grid import LIFT, REACH, STEPS, WIDE
 
 MESH_VERTEX = """
@@ -20,7 +21,7 @@ varying vec3 v_plain;
 attribute vec2 a_uv;
 varying vec2 v_uv;
 #endif
-#ifdef AFFINE
+#ifdef SLOPED
 attribute vec3 a_slope;
 varying vec3 v_slope;
 #endif
@@ -44,7 +45,7 @@ void main() {
 #ifdef MAPPED
     v_uv = a_uv;
 #endif
-#ifdef AFFINE
+#ifdef SLOPED
     v_slope = a_slope;
 #endif
 #ifdef GENERAL
@@ -126,9 +127,18 @@ varying vec2 v_uv;
     + _MAPS
     + """
 #endif
-#ifdef AFFINE
+#ifdef SLOPED
 varying vec3 v_slope;
+#endif
+#ifdef AFFINE
 uniform sampler2D u_map0;
+#endif
+#ifdef CAUGHT
+uniform mat3 u_turn;   // picture from camera
+uniform vec3 u_from;   // of the eye, in the picture's frame: 0 where the picture is far away
+"""
+    + SKY
+    + """
 #endif
 #ifdef GENERAL
 varying vec3 v_sum0;
@@ -146,6 +156,9 @@ void main() {
 #endif
 #ifdef AFFINE
     light += texel(u_map0, level, v_uv) * v_slope;
+#endif
+#ifdef CAUGHT
+    light += sky(u_turn * v_eye + u_from) * v_slope;
 #endif
 #ifdef GENERAL
     light += texel(u_map0, level, v_uv) * v_sum0;
@@ -200,33 +213,6 @@ varying vec2 v_at;
 void main() {
     v_at = 0.5 * a_corner + 0.5;
     gl_Position = vec4(a_corner, 1.0, 1.0);
-}
-"""
-
-BACKDROP_FRAGMENT = """
-#version 120
-varying vec2 v_at;
-uniform sampler2D u_sky;
-uniform vec2 u_sky_size;
-uniform mat3 u_turn;   // picture from camera
-uniform vec2 u_extent; // half width and half height of the picture at distance 1
-uniform vec3 u_light;  // gain and exposure
-const float PI = 3.14159265358979;
-
-vec3 at(float column, float row) {
-    column = mod(column, u_sky_size.x);
-    row = clamp(row, 0.0, u_sky_size.y - 1.0);
-    return texture2D(u_sky, (vec2(column, row) + 0.5) / u_sky_size).rgb;
-}
-
-void main() {
-    vec3 d = u_turn * vec3((2.0 * v_at - 1.0) * u_extent, -1.0);
-    float s = (0.5 - atan(d.x, d.z) / (2.0 * PI)) * u_sky_size.x - 0.5;
-    float t = atan(length(d.xz), d.y) / PI * u_sky_size.y - 0.5;
-    float s0 = floor(s), t0 = floor(t);
-    vec3 near = mix(at(s0, t0), at(s0 + 1.0, t0), s - s0);
-    vec3 far = mix(at(s0, t0 + 1.0), at(s0 + 1.0, t0 + 1.0), s - s0);
-    gl_FragColor = vec4(u_light * mix(near, far, t - t0), 1e30);
 }
 """
 
@@ -343,6 +329,13 @@ void main() {
 """Samples to pixels: averaged, tone-mapped as `studio_core.kernels.tonemap` does, lines and outline added."""
 
 
+_NAMES = {
+    AFFINE: ("MAPPED", "AFFINE", "SLOPED"),
+    GENERAL: ("MAPPED", "GENERAL"),
+    CAUGHT: ("CAUGHT", "SLOPED"),
+}
+
+
 def display_program() -> tuple[str, str]:
     """The last pass."""
     strength = "0.0"
@@ -356,7 +349,7 @@ def display_program() -> tuple[str, str]:
 
 def mesh_program(kind: int, peeled: bool, levels: int) -> tuple[str, str]:
     """Vertex and fragment shader for surfaces whose coefficients are of a kind of `kernels.compose`."""
-    names = ["LIT", *({AFFINE: ["MAPPED", "AFFINE"], GENERAL: ["MAPPED", "GENERAL"]}.get(kind, []))]
+    names = ["LIT", *_NAMES.get(kind, ())]
     names += ["PEELED"] if peeled else []
     defines = "".join(f"#define {name}\n" for name in names) + f"#define LEVELS {levels}\n"
     return _defined(MESH_VERTEX, defines), _defined(MESH_FRAGMENT, defines)
