@@ -31,6 +31,7 @@ from studio_ui.help import Help
 from studio_ui.hint_bar import HintBar
 from studio_ui.layout import Layout
 from studio_ui.menus import Menus
+from studio_ui.palette import Palette, menu_entries
 from studio_ui.panels.all import all_panels
 from studio_ui.panels.panel import stacked
 from studio_ui.project_files import ProjectFiles
@@ -104,6 +105,9 @@ class MainWindow(QMainWindow):
         self.appearance = Appearance(settings, viewport, self.canvas)
         self.layout_ = Layout(self, settings, all_panels(context, self.transfer.load_environment))
         self.panels, self.docks = self.layout_.panels, self.layout_.docks
+        self.palette_ = Palette(
+            self, settings, [lambda: menu_entries(self.menuBar(), self.actions_.reasons())]
+        )
         return [
             self,
             self.files,
@@ -112,6 +116,7 @@ class MainWindow(QMainWindow):
             self.commands,
             self.appearance,
             self.layout_,
+            self.palette_,
             Choosing(context),
             Help(self, context.host),
         ]

@@ -138,6 +138,7 @@ QFrame#notice[role="problem"] { border-left-color: $problem; }
 QFrame#notice[role="warning"] { border-left-color: $warning; }
 QToolButton#corner { background: rgba(20, 20, 20, 150); border: none; border-radius: 12px; }
 QToolButton#corner:hover, QToolButton#corner:focus { background: rgba(20, 20, 20, 230); }
+QFrame#palette { background: $raised; border: 1px solid $border; border-radius: 6px; }
 QFrame#hints { background: $raised; border: none; border-bottom: 1px solid $border; }
 QLabel[role="dim"] { color: $dim; }
 QLabel[role="warning"] { color: $warning; }

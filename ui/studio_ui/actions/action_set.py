@@ -9,7 +9,7 @@ from PySide6.QtGui import QAction, QActionGroup, QKeySequence
 from PySide6.QtWidgets import QMenu, QMenuBar, QToolBar, QWidget
 
 from studio_ui.actions.catalogue import ACTIONS, specs
-from studio_ui.actions.spec import ActionSpec
+from studio_ui.actions.spec import REASONS, ActionSpec
 from studio_ui.features import Condition, Handler
 from studio_ui.icons import icon
 from studio_ui.theme import Theme
@@ -71,6 +71,10 @@ class ActionSet:
                 self.actions[spec.id].setEnabled(known[spec.enabled])
             if spec.checked:
                 self.actions[spec.id].setChecked(known[spec.checked])
+
+    def reasons(self) -> dict[QAction, tuple[str, str]]:
+        """Every action's id, and what is told while it is disabled."""
+        return {self.actions[s.id]: (s.id, REASONS.get(s.enabled, "")) for s in specs()}
 
     def fill_menus(self, bar: QMenuBar) -> None:
         """Menus in the order of the actions."""
