@@ -1,4 +1,4 @@
-"""`lucarne new`: a scene from mesh files, an environment, a floor, materials and a camera."""
+"""`lucarne new`: a scene from mesh files, an environment, a floor or a room, materials and a camera."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
+from studio.build_room import camera_in, room_from
 from studio_core.arrays import frozen_map
 from studio_core.contract import ImportedModel, Registry
 from studio_core.edits import Add
@@ -18,6 +19,7 @@ from studio_core.errors import InputError, LucarneError
 from studio_core.params import ParamInfo, Value, check, param_infos, parse
 from studio_core.scene.geometry import Geometry
 from studio_core.scene.nodes import Camera, Environment, Material, MeshObject, Scene, new_id
+from studio_core.scene.room import Room
 from studio_core.scene.transform import Transform, axis_angle, looking
 from studio_core.session import View
 from studio_core.shading.offline import scene_view
@@ -179,6 +181,9 @@ def build(options: argparse.Namespace, registry: Registry) -> tuple[Scene, list[
             raise InputError(f"--floor {options.floor:g}: expected 0.001 to 10000 metres")
         node, material = floor(options.floor)
         scene = Add((node,), (material,))(scene)
+    room = room_from(options)
+    if room is not None:
+        scene = room(scene)
     if options.env is not None:
         from studio_core.imaging.environment import load_environment
 
@@ -187,7 +192,9 @@ def build(options: argparse.Namespace, registry: Registry) -> tuple[Scene, list[
         scene = scene.with_nodes(Environment(id=new_id("environment"), name=options.env.stem, image=image))
     for text in options.material:
         scene = set_material(scene, text, registry)
-    made = {camera.id: camera for camera in cameras(scene, options.camera)}
+    inside = next(scene.of(Room), None) if not (options.camera or any(scene.of(Camera))) else None
+    found = [camera_in(inside)] if inside is not None else cameras(scene, options.camera)
+    made = {camera.id: camera for camera in found}
     return dataclasses.replace(scene, nodes=frozen_map({**made, **scene.nodes})), notes
 
 

@@ -188,6 +188,7 @@ def parser() -> argparse.ArgumentParser:
     new.add_argument("--unit", choices=("m", "cm", "mm", "in"), default="m", help="of the mesh files")
     new.add_argument("--env", type=Path, metavar="FILE", help="HDR environment")
     new.add_argument("--floor", type=float, metavar="SIZE", help="a square floor, metres")
+    _room_options(new)
     new.add_argument(
         "--material",
         action="append",
@@ -244,6 +245,23 @@ def parser() -> argparse.ArgumentParser:
     bench.add_argument("--growth", choices=("full", "quick", "none"), default="full", help=growth)
     verb("doctor", "check this installation")
     return made
+
+
+def _room_options(verb: argparse.ArgumentParser) -> None:
+    verb.add_argument(
+        "--room",
+        metavar="WxDxH[-WxD]",
+        help="a room of that width, depth and height inside, metres; -WxD: an L",
+    )
+    for name, form, text in (
+        ("window", "WALL:WxH[@SILL[,ALONG]]", "a window in a wall of the room (back, right, front, left)"),
+        ("door", "WALL:WxH[@ALONG]", "a closed door"),
+        ("passage", "WALL:WxH[@ALONG]", "a hole to walk through"),
+        ("without", "WALL", "a wall that is left out"),
+    ):
+        again = f"{text}; may be repeated"
+        verb.add_argument(f"--{name}", action="append", default=[], metavar=form, help=again)
+    verb.add_argument("--open-top", action="store_true", help="a room without a ceiling")
 
 
 def _backend_options(verb: argparse.ArgumentParser) -> None:
