@@ -53,7 +53,10 @@ _MADE_FROM = {f.name for f in fields(Room)} - {f.name for f in fields(MeshObject
 
 @dataclass(frozen=True)
 class Changes:
-    """Nodes by what changed on them (added and removed ones have STRUCTURE), and materials."""
+    """Nodes by what changed on them, and materials.
+
+    Added and removed nodes have STRUCTURE; cameras only ever NAME, since nothing is lit otherwise by them.
+    """
 
     nodes: Mapping[NodeId, Aspect] = field(default_factory=frozen_map)
     materials: frozenset[MaterialId] = frozenset()
@@ -115,6 +118,10 @@ def diff(before: Scene, after: Scene) -> Changes:
             if below != node_id:
                 inherited = nodes[node_id] & (Aspect.TRANSFORM | Aspect.STRUCTURE)
                 nodes[below] = nodes.get(below, Aspect.NONE) | inherited | _light(after[below], inherited)
+    for node_id in nodes:
+        there = [scene.nodes[node_id] for scene in (before, after) if node_id in scene.nodes]
+        if all(isinstance(node, Camera) for node in there):
+            nodes[node_id] = Aspect.NAME  # no light depends on a camera, and who looks through it has a view
     materials = {m for m, new in after.materials.items() if before.materials.get(m) is not new}
     materials |= before.materials.keys() - after.materials.keys()
     aspects = Aspect.MATERIAL if materials else Aspect.NONE

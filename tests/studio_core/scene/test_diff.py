@@ -21,6 +21,7 @@ from studio_core.errors import EditError
 from studio_core.scene.diff import EVERYTHING, Aspect, Changes, diff, everything
 from studio_core.scene.nodes import (
     AreaLamp,
+    Camera,
     Environment,
     Group,
     Light,
@@ -67,6 +68,8 @@ def must_be_named(before: Scene, after: Scene, node: NodeId) -> Aspect:
     kinds = [type(n) for n in (old, new) if n is not None]
     lights = any(issubclass(kind, Light) for kind in kinds)
     lit = Aspect.LIGHT | Aspect.GAIN if lights else NONE
+    if all(kind is Camera for kind in kinds):
+        return Aspect.NAME if old is None or new is None or before.world(node) != after.world(node) else NONE
     if old is None or new is None or type(old) is not type(new):
         return Aspect.STRUCTURE | lit
     must = NONE
@@ -124,7 +127,9 @@ def test_nothing_untouched_is_named(seed: int, steps: int) -> None:
         assert aspect
         told |= aspect
     extra = changes.aspects & ~told
-    assert not extra & ~(Aspect.MATERIAL | Aspect.STRUCTURE | Aspect.NAME)
+    order = [[n.id for n in scene.of(Environment)] for scene in (before, after)]
+    lit = Aspect.LIGHT if order[0] != order[1] else NONE  # the first gives the light
+    assert not extra & ~(Aspect.MATERIAL | Aspect.STRUCTURE | Aspect.NAME | lit)
     if extra & (Aspect.MATERIAL | Aspect.STRUCTURE):
         assert changes.materials
 
@@ -148,9 +153,11 @@ def test_changes_add_up_to_at_least_the_whole(seed: int, middle: int) -> None:
     assert not whole.aspects & ~summed.aspects & ~Aspect.NAME
     assert whole.materials <= summed.materials
     for node, aspect in whole.nodes.items():
-        stayed = node in scenes[0].nodes and node in scenes[-1].nodes
-        needed = aspect if stayed else Aspect.STRUCTURE
-        assert not needed & ~summed.nodes.get(node, NONE)
+        kinds = [type(scene.nodes[node]) for scene in (scenes[0], scenes[-1]) if node in scene.nodes]
+        stayed = len(kinds) == 2 and kinds[0] is kinds[1]
+        needed = aspect if stayed else Aspect.NAME if set(kinds) == {Camera} else Aspect.STRUCTURE
+        told = summed.nodes.get(node, NONE)
+        assert not needed & ~(told | (Aspect.NAME if told & Aspect.STRUCTURE else NONE))
     halves = diff(scenes[0], scenes[middle]) | diff(scenes[middle], scenes[-1])
     assert not whole.aspects & ~halves.aspects & ~Aspect.NAME
 
@@ -208,6 +215,8 @@ LIT = Aspect.LIGHT | Aspect.GAIN
         (edits.SetFields("sky", {"background": False}), {"sky": Aspect.GAIN}),
         (edits.SetFields("cube", {"name": "Box"}), {"cube": Aspect.NAME}),
         (edits.SetFields("camera", {"fov": 20}), {"camera": Aspect.NAME}),
+        (edits.Move({"camera": Transform((0.0, 9.0, 0.0))}), {"camera": Aspect.NAME}),
+        (edits.Remove(("camera",)), {"camera": Aspect.NAME}),
         (edits.SetGeometry("cube", cube(2)), {"cube": Aspect.GEOMETRY}),
         (edits.Assign("cube", "matt"), {"cube": Aspect.MATERIAL | Aspect.STRUCTURE}),
         (edits.SetFields("cube", {"name": "Cube"}), {}),
@@ -226,6 +235,13 @@ def _all(named: dict[str, Aspect]) -> Aspect:
     for aspect in named.values():
         made |= aspect
     return made
+
+
+def test_what_hangs_on_a_camera_moves_with_it() -> None:
+    lamp = PointLamp(id="flash", parent="camera")
+    held = GROUPED.with_nodes(lamp)
+    changes = diff(held, edits.Move({"camera": Transform((0.0, 9.0, 0.0))})(held))
+    assert dict(changes.nodes) == {"camera": Aspect.NAME, "flash": Aspect.TRANSFORM | LIT}
 
 
 def test_another_order_is_a_matter_of_names() -> None:
