@@ -36,6 +36,7 @@ def make(qtbot: QtBot, tmp_path: Path) -> Iterator[Make]:
     ) -> Driver:
         fake, answers = Fake(), answers or Answers()
         settings = Settings(state or tmp_path / "state")
+        settings.set("animate_view", False)
         given: dict[str, Any] = {} if threads else {"compute": InlineExecutor(), "files": InlineExecutor()}
         studio = assemble(
             settings=settings,

@@ -22,7 +22,6 @@ from studio_ui.context import Context
 STEP = 0.05  # metres
 ANGLE = 15.0  # degrees
 _COPY_OFFSET = 0.3
-_EV_LIMIT = 16.0
 
 
 class Commands:
@@ -48,12 +47,8 @@ class Commands:
             "object.lock": self.lock,
             "object.turn_left": lambda: self.turn(ANGLE),
             "object.turn_right": lambda: self.turn(-ANGLE),
-            "view.frame_selection": self.frame_selection,
-            "view.frame_all": self.frame_all,
             "view.new_camera": self.new_camera,
             "view.aim_camera": self.aim_camera,
-            "view.brighter": lambda: self.expose(0.5),
-            "view.darker": lambda: self.expose(-0.5),
             "shade.again": self._context.feed.restart,
             "shade.cancel": self._context.feed.cancel,
         }
@@ -63,8 +58,6 @@ class Commands:
             made[f"object.{name}"] = partial(self.nudge, *way)
         for tool in TOOLS:
             made[f"tool.{tool}"] = partial(self._tools.use, tool)
-        for axis in navigation.AXES:
-            made[f"view.{axis}"] = partial(self.look_from, axis)
         return made
 
     def conditions(self) -> dict[str, Callable[[], bool]]:
@@ -173,18 +166,6 @@ class Commands:
 
     # view
 
-    def frame_selection(self) -> None:
-        """See all of what is chosen, else everything."""
-        self._frame(self.chosen or None)
-
-    def frame_all(self) -> None:
-        """See everything."""
-        self._frame(None)
-
-    def look_from(self, axis: str) -> None:
-        """Front, back, left, right, top or bottom."""
-        self._look(navigation.along_axis(self._context.session.view, axis))
-
     def look_through(self, camera: NodeId) -> None:
         """See what a camera of the scene sees."""
         scene, view = self._context.document.scene, self._context.session.view
@@ -214,19 +195,8 @@ class Commands:
         fields = SetFields(camera, {"fov": view.fov, "focus": view.focus})
         self._apply(Compound(f"Aim {scene[camera].name}", (Move({camera: local}), fields)))
 
-    def expose(self, ev: float) -> None:
-        """More or less exposure."""
-        session = self._context.session
-        session.display(exposure=float(np.clip(session.exposure + ev, -_EV_LIMIT, _EV_LIMIT)))
-
-    def _frame(self, nodes: tuple[NodeId, ...] | None) -> None:
-        found = bounds(self._context.document.scene, nodes)
-        if found is not None:
-            self._look(navigation.frame(self._context.session.view, *found))
-
     def _look(self, view: View) -> None:
-        self._context.feed.step()
-        self._context.session.look(view)
+        self._tools.looking.flight.to(view)
 
     def _fields(self, verb: str, nodes: tuple[NodeId, ...], name: str, value: bool) -> None:
         if nodes:

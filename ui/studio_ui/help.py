@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 
 from PySide6.QtWidgets import QMessageBox, QWidget
 
@@ -16,8 +16,11 @@ from studio_ui.dialogs import KeysDialog, PluginsDialog
 class Help:
     """Windows that tell about the program."""
 
-    def __init__(self, parent: QWidget, host: PluginHost) -> None:
-        self._parent, self._host = parent, host
+    def __init__(
+        self, parent: QWidget, host: PluginHost, looking: Callable[[], Iterable[tuple[str, str]]]
+    ) -> None:
+        """`looking` tells what the mouse does to the view."""
+        self._parent, self._host, self._looking = parent, host, looking
 
     def handlers(self) -> dict[str, Callable[[], object]]:
         """By action id."""
@@ -30,7 +33,7 @@ class Help:
     def keys(self) -> None:
         """What mouse and keys do."""
         keys = [(spec.text.rstrip("…"), spec.shortcut) for spec in specs() if spec.shortcut]
-        KeysDialog(self._parent, [*MOUSE, *keys]).open()
+        KeysDialog(self._parent, [*MOUSE, *self._looking(), *keys]).open()
 
     def plugins(self) -> None:
         """What is loaded and what failed."""

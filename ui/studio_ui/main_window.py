@@ -40,6 +40,7 @@ from studio_ui.settings import Settings
 from studio_ui.status import StatusBar
 from studio_ui.transfer import Transfer
 from studio_ui.view_controls import ViewControls
+from studio_ui.viewing import Viewing
 
 _AUTOSAVE_MS = 500
 
@@ -100,7 +101,8 @@ class MainWindow(QMainWindow):
             viewport, context.document, context.session, context.editing, context.feed, self.status.say
         )
         self.commands = Commands(context, self.tools)
-        self.transfer = Transfer(context, self.ask, self.commands.frame_all, self.files.beside)
+        self.viewing = Viewing(context, self.tools.looking, settings)
+        self.transfer = Transfer(context, self.ask, self.viewing.frame_all, self.files.beside)
         self.canvas = CanvasChoice(viewport, settings, context.journal.write)
         self.appearance = Appearance(settings, viewport, self.canvas)
         self.layout_ = Layout(self, settings, all_panels(context, self.transfer.load_environment))
@@ -114,11 +116,12 @@ class MainWindow(QMainWindow):
             Versions(context, self.ask, self.files),
             self.transfer,
             self.commands,
+            self.viewing,
             self.appearance,
             self.layout_,
             self.palette_,
             Choosing(context),
-            Help(self, context.host),
+            Help(self, context.host, self.viewing.mouse),
         ]
 
     def handlers(self) -> dict[str, Callable[[], object]]:

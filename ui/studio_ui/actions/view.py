@@ -1,6 +1,15 @@
 """The View menu: where from, how bright, how it looks; computing."""
 
 from studio_ui.actions.spec import SEPARATOR, ActionSpec, Item
+from studio_ui.canvas.presets import PRESETS, Preset
+
+
+def _habit(preset: Preset) -> ActionSpec:
+    name = f"navigation_{preset.id}"
+    return ActionSpec(
+        f"view.{name}", preset.label, "View/Navigation", "", preset.tip, group="navigation", checked=name
+    )
+
 
 ITEMS: tuple[Item, ...] = (
     ActionSpec("view.frame_selection", "Frame selection", "View", "F",
@@ -13,6 +22,11 @@ ITEMS: tuple[Item, ...] = (
     ActionSpec("view.left", "Left", "View/Look from", "Ctrl+3", canvas=True),
     ActionSpec("view.top", "Top", "View/Look from", "7", canvas=True),
     ActionSpec("view.bottom", "Bottom", "View/Look from", "Ctrl+7", canvas=True),
+    *(_habit(preset) for preset in PRESETS.values()),
+    ActionSpec("view.invert_wheel", "Turn the wheel the other way", "View/Navigation", "",
+               "Towards the hand goes nearer", checked="invert_wheel"),
+    ActionSpec("view.animate", "Animate the view", "View/Navigation", "",
+               "Move smoothly to where the view is sent", checked="animate"),
     ActionSpec("view.new_camera", "New camera from view", "View", "Ctrl+Alt+0", icon="camera"),
     ActionSpec("view.aim_camera", "Set chosen camera to view", "View", enabled="camera"),
     SEPARATOR,

@@ -11,12 +11,14 @@ from PySide6.QtGui import QImage, QPainter
 from PySide6.QtWidgets import QWidget
 
 from studio_core.scene.nodes import NodeId
+from studio_core.scene.transform import vec3
 from studio_core.session import View
 from studio_core.shading.artifacts import Picture
 from studio_ui.canvas.glyphs import Glyph
 from studio_ui.canvas.hand import Hand
 from studio_ui.canvas.overlay import NOTHING, Overlay, glyph_near, guides
 from studio_ui.canvas.overlay_painter import paint_badge, paint_message, paint_overlay
+from studio_ui.canvas.projection import eye_of, ray
 from studio_ui.canvas.viewport import Probe
 from studio_ui.feed import Freshness
 from studio_ui.theme import DARK, Theme
@@ -150,14 +152,18 @@ class BaseViewport(Hand):
             return None
         room, place = self.target(), QPointF(x * self.width(), y * self.height())
         height, width = self._picture.linear.shape[:2]
-        column = int((place.x() - room.left()) / room.width() * width)
-        row = int((place.y() - room.top()) / room.height() * height)
+        across, down = (place.x() - room.left()) / room.width(), (place.y() - room.top()) / room.height()
+        column, row = int(across * width), int(down * height)
         if not (0 <= column < width and 0 <= row < height):
             return None
         index = int(self._picture.node[row, column])
         red, green, blue = (float(c) for c in self._picture.linear[row, column])
         node = self._picture.nodes[index] if index >= 0 else None
-        return Probe(node, float(self._picture.distance[row, column]), (red, green, blue))
+        distance = float(self._picture.distance[row, column])
+        point = None
+        if np.isfinite(distance):
+            point = vec3(eye_of(self._view) + ray(self._view, across, down) * distance)
+        return Probe(node, distance, (red, green, blue), point)
 
     def glyph_at(self, x: float, y: float) -> NodeId | None:
         """The lamp or camera drawn near a point of the canvas."""

@@ -3,7 +3,15 @@
 from __future__ import annotations
 
 from PySide6.QtCore import QEvent, QPointF, QSize, Qt
-from PySide6.QtGui import QFocusEvent, QKeyEvent, QMouseEvent, QResizeEvent, QWheelEvent
+from PySide6.QtGui import (
+    QFocusEvent,
+    QInputDevice,
+    QKeyEvent,
+    QMouseEvent,
+    QNativeGestureEvent,
+    QResizeEvent,
+    QWheelEvent,
+)
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from studio_core.signal import Signal
@@ -14,6 +22,8 @@ _BUTTONS: dict[Qt.MouseButton, Button] = {
     Qt.MouseButton.MiddleButton: "middle",
     Qt.MouseButton.RightButton: "right",
 }
+_ANGLE_PIXELS = 0.5
+"""Pixels that fingers slide for an eighth of a degree, where a touchpad tells no pixels."""
 _KEYS = {Qt.Key.Key_Escape: "escape", Qt.Key.Key_R: "r"}
 
 
@@ -25,6 +35,8 @@ class Hand(QWidget):
         self.widget: QWidget = self
         self.pointer: Signal[[Pointer]] = Signal()
         self.wheel: Signal[[Pointer, float]] = Signal()
+        self.scroll: Signal[[Pointer, float, float]] = Signal()
+        self.pinch: Signal[[Pointer, float]] = Signal()
         self.key: Signal[[str, bool]] = Signal()
         self.left: Signal[[]] = Signal()
         self.resized: Signal[[int, int]] = Signal()
@@ -70,11 +82,26 @@ class Hand(QWidget):
         self._send("double", event)
 
     def wheelEvent(self, event: QWheelEvent) -> None:
-        """Steps of a wheel, or of a touchpad."""
-        steps = event.angleDelta().y() / 120 or event.pixelDelta().y() / 60
-        if steps:
-            self.wheel.emit(self._pointer("move", event.position(), event.modifiers()), steps)
+        """Steps of a wheel, or what two fingers slide on a touchpad."""
+        pointer = self._pointer("move", event.position(), event.modifiers())
+        pixels, angle = event.pixelDelta(), event.angleDelta()
+        if _fingers(event):
+            slid = pixels if not pixels.isNull() else angle * _ANGLE_PIXELS
+            if not slid.isNull():
+                height = max(self.height(), 1)
+                self.scroll.emit(pointer, slid.x() / height, slid.y() / height)
+        elif angle.y() or pointer.alt:
+            self.wheel.emit(pointer, (angle.y() or angle.x()) / 120)  # with Alt Qt turns the wheel sideways
         event.accept()
+
+    def event(self, event: QEvent) -> bool:
+        """Two fingers that spread or close."""
+        if isinstance(event, QNativeGestureEvent):
+            if event.gestureType() is Qt.NativeGestureType.ZoomNativeGesture:
+                self.pinch.emit(self._pointer("move", event.position(), event.modifiers()), event.value())
+                return True
+            return False
+        return super().event(event)
 
     def leaveEvent(self, event: QEvent) -> None:
         """Nothing is under the mouse any more."""
@@ -114,3 +141,11 @@ class Hand(QWidget):
             bool(keys & Qt.KeyboardModifier.AltModifier),
             (self.width(), self.height()),
         )
+
+
+def _fingers(event: QWheelEvent) -> bool:
+    """Whether this comes from a touchpad: only there are there pixels, phases, or the device says so."""
+    if not event.pixelDelta().isNull() or event.phase() is not Qt.ScrollPhase.NoScrollPhase:
+        return True
+    device = event.device()
+    return device is not None and device.type() is QInputDevice.DeviceType.TouchPad

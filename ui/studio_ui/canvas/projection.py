@@ -65,17 +65,21 @@ def project_segments(view: View, segments: npt.ArrayLike) -> F64:
     return project(view, ends).reshape(-1, 2, 2)
 
 
+def own_corners(scene: Scene, node: NodeId) -> F64:
+    """(8, 3) corners of the box around a node's own mesh, in the world; (0, 3) where it has none."""
+    made = scene[node]
+    if not isinstance(made, MeshObject) or not len(made.geometry.positions):
+        return np.zeros((0, 3))
+    low, high = made.geometry.bounds
+    box = np.array(np.meshgrid(*zip(low, high, strict=True))).reshape(3, -1).T
+    matrix = scene.world(node).matrix()
+    found: F64 = box @ matrix[:3, :3].T + matrix[:3, 3]
+    return found
+
+
 def corners(scene: Scene, node: NodeId) -> F64:
     """(N, 3) corners of the boxes around all meshes at and under a node, in the world."""
-    found = [np.zeros((0, 3))]
-    for below in scene.subtree(node):
-        made = scene[below]
-        if isinstance(made, MeshObject) and len(made.geometry.positions):
-            low, high = made.geometry.bounds
-            box = np.array(np.meshgrid(*zip(low, high, strict=True))).reshape(3, -1).T
-            matrix = scene.world(below).matrix()
-            found.append(box @ matrix[:3, :3].T + matrix[:3, 3])
-    return np.concatenate(found)
+    return np.concatenate([np.zeros((0, 3)), *(own_corners(scene, below) for below in scene.subtree(node))])
 
 
 def bounds(scene: Scene, nodes: Any = None) -> tuple[F64, F64] | None:

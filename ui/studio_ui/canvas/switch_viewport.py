@@ -20,7 +20,7 @@ from studio_ui.canvas.viewport import Pointer, Probe, Viewport
 from studio_ui.feed import Freshness
 from studio_ui.theme import Theme
 
-_SIGNALS = ("pointer", "wheel", "key", "left", "resized")
+_SIGNALS = ("pointer", "wheel", "scroll", "pinch", "key", "left", "resized")
 
 
 class SwitchViewport(QWidget):
@@ -31,6 +31,8 @@ class SwitchViewport(QWidget):
         self.widget: QWidget = self
         self.pointer: Signal[[Pointer]] = Signal()
         self.wheel: Signal[[Pointer, float]] = Signal()
+        self.scroll: Signal[[Pointer, float, float]] = Signal()
+        self.pinch: Signal[[Pointer, float]] = Signal()
         self.key: Signal[[str, bool]] = Signal()
         self.left: Signal[[]] = Signal()
         self.resized: Signal[[int, int]] = Signal()

@@ -61,6 +61,7 @@ class CanvasTools:
 
     def close(self) -> None:
         """Stop listening."""
+        self.looking.close()
         for off in self._off:
             off()
 
@@ -149,9 +150,13 @@ class CanvasTools:
     def _start(self, press: Pointer) -> None:
         """A click has become a drag."""
         self._drag = self._drag_for(press, self._document.scene)
-        if self._drag is None:
+        looks = self.looking.mode_of(press)
+        if self._drag is None and looks is not None:
             self._mode = "look"
-            self.looking.start(self.looking.mode_of(press), press)
+            self.looking.start(looks, press)
+        elif self._drag is None:
+            self._mode = ""
+            return
         elif self._editing.begin(self, self._drag.label):
             self._mode = "drag"  # the window holds for every gesture that edits
         else:
@@ -160,7 +165,7 @@ class CanvasTools:
         self.refresh()
 
     def _drag_for(self, press: Pointer, scene: Scene) -> Drag | None:
-        if press.button == "right" and press.shift:
+        if self.looking.turns_light(press):
             environment = next((e for e in scene.of(Environment) if scene.shown(e.id)), None)
             return LightDrag(environment, press) if environment is not None else None
         if press.button != "left" or press.alt or (self.tool == "select" and not self._turning):

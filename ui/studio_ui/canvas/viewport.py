@@ -12,6 +12,7 @@ from PySide6.QtGui import QImage
 from PySide6.QtWidgets import QWidget
 
 from studio_core.scene.nodes import NodeId
+from studio_core.scene.transform import Vec3
 from studio_core.session import View
 from studio_core.shading.artifacts import Picture
 from studio_core.signal import Signal
@@ -44,19 +45,29 @@ class Pointer:
 
 @dataclass(frozen=True)
 class Probe:
-    """What lies under a point of the canvas: node (None: nothing), metres along the ray, linear radiance."""
+    """What lies under a point of the canvas: node (None: nothing), metres along the ray, linear radiance.
+
+    `point` is where that is in the world; None where there is nothing.
+    """
 
     node: NodeId | None
     distance: float
     radiance: tuple[float, float, float]
+    point: Vec3 | None = None
 
 
 class Viewport(Protocol):
-    """Shows pictures and reports what the hand does. `resized` gives device pixels."""
+    """Shows pictures and reports what the hand does. `resized` gives device pixels.
+
+    `wheel` gives steps of a mouse wheel, away from the hand positive; `scroll` what two fingers slid on a
+    touchpad, right and down, in shares of the canvas' height; `pinch` by which share they spread.
+    """
 
     widget: QWidget
     pointer: Signal[[Pointer]]
     wheel: Signal[[Pointer, float]]
+    scroll: Signal[[Pointer, float, float]]
+    pinch: Signal[[Pointer, float]]
     key: Signal[[str, bool]]
     left: Signal[[]]
     resized: Signal[[int, int]]

@@ -13,6 +13,7 @@ from PySide6.QtCore import QRectF, Qt
 from PySide6.QtGui import QColor, QImage, QPainter, QPaintEvent, QResizeEvent
 from PySide6.QtWidgets import QWidget
 
+from studio_core.scene.transform import vec3
 from studio_core.session import View
 from studio_core.shading.artifacts import Picture
 from studio_ui.canvas.base_viewport import BaseViewport
@@ -22,6 +23,7 @@ from studio_ui.canvas.gl_report import SOFTWARE
 from studio_ui.canvas.gl_surface import GlSurface
 from studio_ui.canvas.glyphs import Glyph
 from studio_ui.canvas.overlay import NOTHING, Overlay
+from studio_ui.canvas.projection import eye_of, ray
 from studio_ui.canvas.viewport import GRID, Probe
 from studio_ui.feed import Freshness
 
@@ -76,10 +78,12 @@ class VispyViewport(BaseViewport):
             return super().probe(x, y)
         if picture.colours is None:
             return None
-        found = self.surface.pick(picture, self.view.sized(*self.device_size()), x, y)
+        view = self.view.sized(*self.device_size())
+        found = self.surface.pick(picture, view, x, y)
         if found is None:
             return Probe(None, float("inf"), (0.0, 0.0, 0.0))
-        return Probe(picture.nodes[found.object], found.distance, found.radiance)
+        point = vec3(eye_of(view) + ray(view, x, y) * found.distance)
+        return Probe(picture.nodes[found.object], found.distance, found.radiance, point)
 
     def release(self) -> None:
         """Give everything back to the GPU: contexts share what they hold, so that it outlives them."""
