@@ -21,7 +21,7 @@ from studio_core.document import Document
 from studio_core.edits import Add, Compound, Move, Remove, SetFields
 from studio_core.errors import EditError
 from studio_core.scene.diff import diff
-from studio_core.scene.nodes import Camera, Environment, Group, MeshObject, NodeId, Scene
+from studio_core.scene.nodes import Camera, Environment, Group, MeshObject, NodeId, PointLamp, Scene
 from studio_core.scene.transform import Transform
 from studio_ui.editing import Editing
 from studio_ui.material_drag import material_data
@@ -90,9 +90,9 @@ def test_any_edits_leave_the_tree_as_the_scene_has_it(qapp: QApplication, seed: 
 
 
 def crowd(count: int) -> Scene:
-    """Groups of fifty cameras each."""
+    """Groups of fifty lamps each."""
     groups = [Group(id=f"g{i}", name=f"Group {i}") for i in range(count // 50)]
-    things = [Camera(id=f"c{i}", name=f"Camera {i}", parent=f"g{i // 50}") for i in range(count)]
+    things = [PointLamp(id=f"c{i}", name=f"Lamp {i}", parent=f"g{i // 50}") for i in range(count)]
     return Add((*groups, *things))(Scene())
 
 
