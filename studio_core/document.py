@@ -126,6 +126,37 @@ class Document:
             raise
         self.commit()
 
+    @contextmanager
+    def grouped(self, label: str) -> Iterator[None]:
+        """Whatever is done inside is one step of the history; an exception puts everything back as it was.
+
+        Edits, gestures and undo work inside as they do outside. A single step keeps its own label.
+        """
+        self._assert_thread()
+        if self._gesture is not None:
+            raise EditError("finish the gesture first")
+        steps, costs, at = list(self._steps), list(self._costs), self._at
+        try:
+            yield
+            self.commit()
+        except BaseException:
+            self._gesture = None
+            self._steps, self._costs, self._at = steps, costs, at
+            self._show(steps[at].scene)
+            raise
+        self._join(label, {id(step) for step in steps})
+
+    def _join(self, label: str, known: set[int]) -> None:
+        """Make one step of those up to this one that are not `known`."""
+        first = next((i for i, step in enumerate(self._steps) if id(step) not in known), len(self._steps))
+        if first == 0 or first >= self._at:
+            return
+        before, joined = self._steps[first - 1].scene, Step(label, self._scene)
+        same = self._scene is before
+        self._steps[first : self._at + 1] = [] if same else [joined]
+        self._costs[first : self._at + 1] = [] if same else [_cost(before, joined.scene)]
+        self._at = first - 1 if same else first
+
     def begin(self, label: str) -> Gesture:
         """Start a gesture that spans events; `commit` or `cancel` ends it."""
         self._assert_thread()
