@@ -66,7 +66,9 @@ def _sorted(
     fitting = [word for word in words if word.casefold().startswith(start.casefold())]
     if not start.startswith("_"):
         fitting = [word for word in fitting if not word.startswith("_")]
-    fitting.sort(key=lambda w: (not w.startswith(start), values is not None and w not in values, w.casefold()))
+    fitting.sort(
+        key=lambda w: (not w.startswith(start), values is not None and w not in values, w.casefold())
+    )
     made = []
     for word in fitting[:MOST]:
         thing = _attribute(owner, word) if values is None else values.get(word, getattr(builtins, word, None))

@@ -20,7 +20,7 @@ from studio_core.document import Document
 from studio_core.errors import Cancelled, InputError, LucarneError
 from studio_core.scripting.output import Limited
 from studio_core.scripting.shown import shown
-from studio_core.scripting.ticking import FIRST, leads_to, ticking
+from studio_core.scripting.ticking import FIRST, open_frame, ticking
 
 _LABEL = 44  # characters of a command in the history
 
@@ -111,7 +111,7 @@ class Interpreter:
             body, last = _compiled(source, file)
             with self._streams(), self._document.grouped(label):
                 try:
-                    with ticking(self._tick, lambda frame: leads_to(frame, file), self._first):
+                    with ticking(self._tick, lambda frame: open_frame(frame, file), self._first):
                         exec(body, self.namespace)
                         value = eval(last, self.namespace) if last is not None else None
                         if value is not None:
@@ -127,8 +127,8 @@ class Interpreter:
     @contextlib.contextmanager
     def _streams(self) -> Iterator[None]:
         """What is printed comes here; nobody is there to answer `input()`."""
-        out = Limited(lambda text: self._write(text, False), sys.stdout)
-        err = Limited(lambda text: self._write(text, True), sys.stderr)
+        out: Any = Limited(lambda text: self._write(text, False), sys.stdout)
+        err: Any = Limited(lambda text: self._write(text, True), sys.stderr)
         stdin, sys.stdin = sys.stdin, io.StringIO()
         try:
             with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
@@ -169,9 +169,7 @@ def own_lines(error: BaseException, file: str) -> str:
         for frame in traceback.extract_tb(error.__traceback__)
         if frame.filename == file or frame.filename.startswith("<console ")
     ]
-    said = (
-        [f"{error}\n"] if isinstance(error, LucarneError) else traceback.format_exception_only(error)
-    )
+    said = [f"{error}\n"] if isinstance(error, LucarneError) else traceback.format_exception_only(error)
     if not frames or (len(frames) == 1 and frames[0].line and "\n" not in _text(file)):
         return "".join(said).rstrip("\n")  # the one line is there to be seen
     return "".join([*traceback.format_list(frames), *said]).rstrip("\n")

@@ -107,7 +107,7 @@ class Names:
         return finding.node_named(self.scene, str(name))
 
     def find_all(self, pattern: str = "*", kind: type[Node] = Node) -> list[Any]:
-        """All nodes whose name fits a pattern such as `Chair*`; with `kind` only those, such as `Camera`."""
+        """All nodes with a name such as `Chair*`; with `kind` only those, such as `Camera`."""
         return [node for node in finding.matching(self.scene, pattern) if isinstance(node, kind)]
 
     def material(self, name: Thing) -> Material:
@@ -138,7 +138,7 @@ class Names:
         return Size(width, depth, height)
 
     def bounds(self, thing: Thing | None = None) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
-        """Lowest and highest corner in the world, metres; without a thing those of everything that is shown."""
+        """Lowest and highest corner in the world, metres; without a thing of all that is shown."""
         if thing is None:
             return scene_bounds(self.scene)
         node = self.find(thing)
@@ -167,10 +167,8 @@ class Names:
         for _ in range(steps):
             self._document.redo()
 
-    def move(
-        self, thing: Thing, to: npt.ArrayLike | None = None, by: npt.ArrayLike | None = None
-    ) -> None:
-        """Put a thing's origin at `to`, or move it `by` so much: (x, y, z) in metres, in the world."""
+    def move(self, thing: Thing, to: npt.ArrayLike | None = None, by: npt.ArrayLike | None = None) -> None:
+        """Put a thing at `to`, or move it `by` so much: (x, y, z) in metres, in the world."""
         node = self.find(thing)
         world = self.scene.world(node.id)
         place = np.asarray(world.translation if to is None else to, np.float64)
@@ -196,7 +194,7 @@ class Names:
         return self.find(fresh)
 
     def change(self, thing: Thing, **values: Any) -> None:
-        """Other values for a node (`hidden=True`, `azimuth=30`) or a material (`roughness=0.2`, `model="ggx"`).
+        """Other values for a node (`hidden=True`) or a material (`roughness=0.2`, `model="ggx"`).
 
         A name means the node of that name, else the material.
         """
@@ -236,7 +234,7 @@ class Names:
         self._document.apply(Remove(ids, f"Delete {self.scene[ids[0]].name}" if len(ids) == 1 else "Delete"))
 
     def add_model(self, path: str | Path, at: npt.ArrayLike = (0.0, 0.0, 0.0), unit: float = 1.0) -> Any:
-        """Add what a model file holds, standing `at` a point; `unit` is the file's, in metres. The new node."""
+        """Add a model from a file, standing `at` a point; `unit` is the file's, in metres. The new node."""
         path = Path(path)
         model: ImportedModel = self._run(f"Importing {path.name}", lambda job: self._load(path, unit))
         top = Group(id=new_id("group"), name=path.stem)
@@ -249,7 +247,10 @@ class Names:
         return self.find(top)
 
     def light_from(self, path: str | Path) -> Any:
-        """Light the scene with a picture of light (EXR, HDR); an environment that is there keeps its settings."""
+        """Light the scene with a picture of light (EXR, HDR).
+
+        An environment that is there keeps its settings.
+        """
         from studio_core.imaging.environment import load_environment
 
         path = Path(path)
@@ -274,7 +275,7 @@ class Names:
     def picture(
         self, size: tuple[int, int] = (960, 540), camera: Thing | None = None, antialias: int = 2
     ) -> npt.NDArray[np.float32]:
-        """(height, width, 3) scene-linear radiance, as a camera sees it; without one, as it is looked at now."""
+        """(height, width, 3) scene-linear radiance, as a camera sees it or as it is looked at now."""
         from studio_core.shading import offline
 
         width, height = size

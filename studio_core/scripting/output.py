@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import threading
 from collections.abc import Callable
 from typing import TextIO
@@ -11,7 +10,7 @@ MOST = 200_000  # characters of one command
 LINE = 4_000  # characters handed on of one line
 
 
-class Limited(io.TextIOBase):
+class Limited:
     """A stream that hands text to `write` and counts what is beyond the limit.
 
     What other threads print meanwhile, or `write` itself, goes to `beside`.
@@ -24,9 +23,14 @@ class Limited(io.TextIOBase):
         self._busy = False
         self.dropped = 0
 
-    def writable(self) -> bool:
-        """Always."""
-        return True
+    encoding = "utf-8"
+
+    def flush(self) -> None:
+        """Nothing is held back."""
+
+    def isatty(self) -> bool:
+        """No."""
+        return False
 
     def write(self, text: str) -> int:
         """Hand on what the limit leaves room for."""

@@ -131,7 +131,13 @@ def overview(groups: Mapping[str, Sequence[str]], names: Mapping[str, Any]) -> s
     for group, members in groups.items():
         lines += ["", group]
         lines += [f"  {name:<18}{_said(name, names)}".rstrip() for name in members]
-    return "\n".join([*lines[1:], "", "help(find) tells more of one of them; every kind of node and edit has its name too."])
+    return "\n".join(
+        [
+            *lines[1:],
+            "",
+            "help(find) tells more of one of them; every kind of node and edit has its name too.",
+        ]
+    )
 
 
 _OTHERS = {

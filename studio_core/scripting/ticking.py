@@ -2,51 +2,57 @@
 
 A helper thread sends the main thread a signal every few hundredths of a second; Python then runs the
 signal's handler between two steps of whatever runs. Until the first tick and between ticks that costs
-nothing. A trace function (`sys.settrace`) could do the same, but makes a loop of a person's code several
-times slower and does not wake `time.sleep`.
+nothing. A trace function (`sys.settrace`) alone could do the same, but makes a loop of a person's code
+several times slower and does not wake `time.sleep`; here it is set for one step, where a signal came at a
+bad moment.
 """
 
 from __future__ import annotations
 
 import _thread
 import signal
+import sys
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from types import FrameType
+from typing import Any
 
-FIRST, EVERY, AGAIN = 0.3, 0.05, 0.003  # seconds
-CLOSED = ("studio_ui", "studio_core.document", "studio_core.signal", "threading", "importlib._bootstrap")
-"""Modules that are never left half way: a tick that finds one of them at work waits for the next."""
+FIRST, EVERY = 0.3, 0.05  # seconds
+CLOSED = (
+    *("studio_ui", "studio_core.document", "studio_core.signal", "studio_core.scripting.output"),
+    *("threading", "importlib._bootstrap"),
+)
+"""Modules that are never left half way: a tick that finds one of them at work waits until it is done."""
 
 
-def leads_to(frame: FrameType | None, file: str) -> bool:
-    """Whether `frame` was called from code of `file` without a module of `CLOSED` between."""
-    while frame is not None:
-        if frame.f_code.co_filename == file:
-            return True
+def open_frame(frame: FrameType | None, file: str) -> FrameType | None:
+    """The innermost frame below code of `file` that nothing of `CLOSED` is at or below; None outside of it."""
+    found = None
+    while frame is not None and frame.f_code.co_filename != file:
         if str(frame.f_globals.get("__name__", "")).startswith(CLOSED):
-            return False
+            found = None
+        elif found is None:
+            found = frame
         frame = frame.f_back
-    return False
+    return (found or frame) if frame is not None else None
 
 
 @contextmanager
 def ticking(
-    tick: Callable[[], bool], open_at: Callable[[FrameType | None], bool], first: float = FIRST
+    tick: Callable[[], bool], place: Callable[[FrameType | None], FrameType | None], first: float = FIRST
 ) -> Iterator[None]:
     """Inside, `tick()` is called on this thread, first after `first` seconds; True raises KeyboardInterrupt.
 
-    Nothing happens while `open_at(frame)` is False for the frame at work, and within a tick. Ctrl-C is
-    as good as a tick that says True. On other threads than the main one nothing ticks at all.
+    `place(frame)` says where from the frame at work outwards that may happen: there (None: not now). No
+    tick comes within a tick. Ctrl-C is as good as a tick that says True. On other threads than the main
+    one nothing ticks at all.
     """
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    over = threading.Event()
-    asked = threading.Event()  # by the helper; otherwise it was Ctrl-C
+    over, asked = threading.Event(), threading.Event()  # asked by the helper; otherwise it was Ctrl-C
     stopping = within = False
-    owed = False  # a tick that came where nothing may happen
     main = threading.get_ident()
 
     def send() -> None:
@@ -57,17 +63,31 @@ def ticking(
                 signal.pthread_kill(main, signal.SIGINT)  # wakes what sleeps, too
             else:
                 _thread.interrupt_main()
-            wait = AGAIN if owed else EVERY
+            wait = EVERY
 
     def handle(number: int, frame: FrameType | None) -> None:
-        nonlocal stopping, within, owed
+        nonlocal stopping
         if asked.is_set():
             asked.clear()
         else:
             stopping = True
-        owed = not within and not open_at(frame)
-        if over.is_set() or within or owed:
+        here = None if within or over.is_set() else place(frame)
+        if here is None:
             return
+        if here is frame:
+            serve()
+        elif sys.gettrace() is None:
+            here.f_trace = at_next_step
+            sys.settrace(lambda frame, event, argument: None)
+
+    def at_next_step(frame: FrameType, event: str, argument: object) -> Any:
+        sys.settrace(None)
+        frame.f_trace = None
+        if not over.is_set():
+            serve()
+
+    def serve() -> None:
+        nonlocal stopping, within
         within = True
         try:
             stopping = tick() or stopping

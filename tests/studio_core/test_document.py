@@ -6,6 +6,7 @@ that is a list of fingerprints.
 
 from __future__ import annotations
 
+import contextlib
 import gc
 import shutil
 import tempfile
@@ -158,6 +159,30 @@ class UndoMachine(RuleBasedStateMachine):
         with pytest.raises(EditError, match="over"):
             over.apply(move(2.0))
 
+    @precondition(lambda self: self.gesture is None)
+    @rule(seeds=st.lists(SEEDS, max_size=4), fails=st.booleans())
+    def group(self, seeds: list[int], fails: bool) -> None:
+        """Edits and a gesture that nobody ends are one step; an error brings back what was."""
+        before, steps = self.document.scene, self.document.history
+        with contextlib.suppress(ZeroDivisionError), self.document.grouped("Group"):
+            for seed in seeds:
+                with contextlib.suppress(EditError):
+                    self.document.apply(self.some_edit(seed, self.document.scene))
+            with contextlib.suppress(EditError):
+                self.document.begin("Left open").add(self.some_edit(0, self.document.scene))
+            pushed = len({*map(id, self.document.history)} - {*map(id, steps)})
+            pushed += self.document.scene is not self.document.history[self.document.position].scene
+            if fails:
+                raise ZeroDivisionError
+        if fails:
+            assert self.document.history == steps
+        elif pushed:
+            del self.prints[self.at + 1 :]
+            if self.document.scene is not before:
+                self.shown = fingerprint(self.document.scene)
+                self.pushed(self.shown)
+                assert pushed == 1 or self.document.history[-1].label == "Group"
+
     @rule(forward=st.booleans())
     def step(self, forward: bool) -> None:
         wanted = self.at + (1 if forward else -1)
@@ -291,6 +316,45 @@ def test_memory_is_flat_over_edits_with_undo(make: Callable[[int], edits.Edit]) 
 
 
 # ---------------------------------------------------------------- examples
+
+
+def test_undo_inside_a_group_is_undo() -> None:
+    document = Document(little_scene())
+    for x in (1.0, 2.0, 3.0):
+        document.apply(move(x))
+    with document.grouped("Group"):
+        document.undo()
+        document.undo()
+    assert (document.position, len(document.history)) == (1, 4)
+    with document.grouped("Group"):
+        document.undo()
+        document.apply(move(4.0))
+        document.apply(move(5.0))
+        document.apply(move(6.0))
+        document.undo()
+    assert [step.label for step in document.history] == ["Open", "Group", "Move to 6.0"]
+    assert document.scene["cube"].transform.translation[0] == 5.0
+    assert document.redo()
+    with pytest.raises(ZeroDivisionError), document.grouped("Group"):
+        document.go_to(0)
+        document.apply(move(7.0))
+        raise ZeroDivisionError
+    assert [step.label for step in document.history] == ["Open", "Group", "Move to 6.0"]
+    assert document.position == 2
+    assert document.history_bytes() == sum(document._costs)
+
+
+def test_a_group_that_changes_nothing_in_the_end_is_no_step() -> None:
+    document = Document(little_scene())
+    with document.grouped("Group"):
+        document.apply(edits.Add((Group(id="a"),)))
+        document.undo()
+    assert len(document.history) == 2  # it can be done again
+    with document.grouped("Group"):
+        pass
+    with document.gesture("Drag"), pytest.raises(EditError, match="finish the gesture"):
+        with document.grouped("Group"):
+            pass
 
 
 def test_a_gesture_is_one_step_from_the_press() -> None:
