@@ -66,9 +66,8 @@ def _sorted(
     fitting = [word for word in words if word.casefold().startswith(start.casefold())]
     if not start.startswith("_"):
         fitting = [word for word in fitting if not word.startswith("_")]
-    fitting.sort(
-        key=lambda w: (not w.startswith(start), values is not None and w not in values, w.casefold())
-    )
+    known = fitting if values is None else values
+    fitting.sort(key=lambda word: (not word.startswith(start), word not in known, word.casefold()))
     made = []
     for word in fitting[:MOST]:
         thing = _attribute(owner, word) if values is None else values.get(word, getattr(builtins, word, None))

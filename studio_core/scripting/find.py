@@ -18,9 +18,9 @@ def path_of(scene: Scene, node: NodeId) -> str:
 
 
 def node_named(scene: Scene, name: str) -> Node:
-    """The node of that id, name, or path (`Armchair/Frame`); upper and lower case count only as a last resort.
+    """The first node of that id, name, or path (`Armchair/Frame`), else of that name in other case.
 
-    EditError when there is none, with names like it, or when a name is only another node's in other case twice.
+    EditError when there is none, with names that are like it.
     """
     if name in scene.nodes:
         return scene.nodes[name]

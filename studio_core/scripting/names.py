@@ -1,4 +1,4 @@
-"""The names that scripts and the console have: one document, what can be done to it, and what it is made of."""
+"""The names that scripts and the console have: a document, what can be done to it, what it is made of."""
 
 from __future__ import annotations
 

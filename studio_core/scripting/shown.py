@@ -131,15 +131,12 @@ def overview(groups: Mapping[str, Sequence[str]], names: Mapping[str, Any]) -> s
     for group, members in groups.items():
         lines += ["", group]
         lines += [f"  {name:<18}{_said(name, names)}".rstrip() for name in members]
-    return "\n".join(
-        [
-            *lines[1:],
-            "",
-            "help(find) tells more of one of them; every kind of node and edit has its name too.",
-        ]
-    )
+    return "\n".join([*lines[1:], "", _MORE])
 
 
+_MORE = (
+    "help(find) tells more of one of them. Every kind of node and edit has its own name too: Camera, Move, …"
+)
 _OTHERS = {
     "document": "The project: its scene, history, undo",
     "scene": "The scene as it is now",

@@ -15,7 +15,7 @@ _MOST = 400  # characters
 
 
 def spelled(edit: Edit) -> str | None:
-    """`apply(Move({'chair': Transform((1, 0, 0))}, label='Move Chair'))`, or None where it holds meshes or pictures.
+    """`apply(Move({'chair': Transform((1, 0, 0))}))`; None for an edit that holds a mesh or a picture.
 
     What is left to its default is left out.
     """

@@ -27,7 +27,7 @@ CLOSED = (
 
 
 def open_frame(frame: FrameType | None, file: str) -> FrameType | None:
-    """The innermost frame below code of `file` that nothing of `CLOSED` is at or below; None outside of it."""
+    """The innermost frame under code of `file` that has nothing of `CLOSED` above it; None outside of it."""
     found = None
     while frame is not None and frame.f_code.co_filename != file:
         if str(frame.f_globals.get("__name__", "")).startswith(CLOSED):

@@ -352,9 +352,9 @@ def test_a_group_that_changes_nothing_in_the_end_is_no_step() -> None:
     assert len(document.history) == 2  # it can be done again
     with document.grouped("Group"):
         pass
-    with document.gesture("Drag"), pytest.raises(EditError, match="finish the gesture"):
-        with document.grouped("Group"):
-            pass
+    document.begin("Drag")
+    with pytest.raises(EditError, match="finish the gesture"), document.grouped("Group"):
+        pass
 
 
 def test_a_gesture_is_one_step_from_the_press() -> None:

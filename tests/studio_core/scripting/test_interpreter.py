@@ -142,7 +142,7 @@ def test_what_never_ends_can_be_stopped(prompt: Prompt, source: str) -> None:
     outcome = prompt.run(source)
     assert outcome.stopped
     assert outcome.error == "Stopped."
-    assert prompt.ticks == 3
+    assert prompt.ticks >= 3
     assert prompt.document.scene is before
 
 
