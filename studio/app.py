@@ -118,9 +118,10 @@ def assemble(
 
     editing = Editing(document, journal.problem)
     tasks = Tasks(files, bridge.post, journal)
-    shading = shading or PluginShading(Services(workers, host, DiskCache(user_cache() / "computed")))
+    services = Services(workers, host, DiskCache(user_cache() / "computed"))
+    shading = shading or PluginShading(services)
     feed = PictureFeed(document, session, shading, compute, bridge.post, bridge.later)
-    context = Context(document, session, editing, host, journal, tasks, feed)
+    context = Context(document, session, editing, host, journal, tasks, feed, services, compute, bridge.quiet)
     viewport = SwitchViewport(RasterViewport())
     window = MainWindow(context, viewport, settings, files, _samples(), ask, Thumbnails(thumbnails))
     for failure in host.failures:

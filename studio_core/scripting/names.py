@@ -186,12 +186,13 @@ class Names:
     def copy(self, thing: Thing, by: npt.ArrayLike = (0.0, 0.0, 0.0)) -> Any:
         """A copy that shares its meshes, moved `by` so many metres; the new node."""
         node = self.find(thing)
-        edit = duplicate(self.scene, (node.id,))
-        self._document.apply(edit)
-        fresh = edit.nodes[0]
-        if np.any(np.asarray(by)):
-            self.move(fresh, by=by)
-        return self.find(fresh)
+        offset = Transform(vec3(by))
+        if node.parent is not None:
+            above = self.scene.world(node.parent)
+            offset = above.inverse() @ offset @ above
+        edit = duplicate(self.scene, (node.id,), offset=offset)
+        self._document.apply(dataclasses.replace(edit, label=f"Copy {node.name}"))
+        return self.find(edit.nodes[0])
 
     def change(self, thing: Thing, **values: Any) -> None:
         """Other values for a node (`hidden=True`) or a material (`roughness=0.2`, `model="ggx"`).

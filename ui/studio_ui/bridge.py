@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 
 from PySide6.QtCore import QCoreApplication, QObject, Qt, QTimerEvent, Signal
 
@@ -19,6 +20,7 @@ class Bridge(QObject):
         self._guard = threading.Lock()
         self._open = True
         self._later: dict[int, Callable[[], object]] = {}
+        self._held: list[Callable[[], object]] | None = None
         self._called.connect(self._run, Qt.ConnectionType.QueuedConnection)
 
     def post(self, call: Callable[[], object]) -> None:
@@ -31,6 +33,20 @@ class Bridge(QObject):
         """Run `call` after a while; from the window's thread alone."""
         if self._open:
             self._later[self.startTimer(milliseconds)] = call
+
+    @contextmanager
+    def quiet(self) -> Iterator[None]:
+        """Inside, calls wait, also while events are handled; they run soon after, in their order."""
+        if self._held is not None:
+            yield
+            return
+        self._held = []
+        try:
+            yield
+        finally:
+            held, self._held = self._held, None
+            for call in held:
+                self.post(call)
 
     def close(self) -> None:
         """Drop what is queued and what is still to come."""
@@ -50,6 +66,9 @@ class Bridge(QObject):
 
     def _run(self, call: Callable[[], object]) -> None:
         if not self._open:
+            return
+        if self._held is not None:
+            self._held.append(call)
             return
         try:
             call()

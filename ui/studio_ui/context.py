@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field
 
+from studio_core.contract import Services
 from studio_core.document import Document
 from studio_core.registry import PluginHost
 from studio_core.session import Session
+from studio_core.shading.scheduler import Executor
 from studio_core.signal import Signal
 from studio_ui.editing import Editing
 from studio_ui.feed import PictureFeed
@@ -36,6 +39,7 @@ class Context:
     """Document, session and what serves them. `warm` tells whether models and backends are loaded.
 
     Before that panels must not touch `host.get`: it would import what is heavy on the window's thread.
+    `compute` runs what needs kernels, with `services`; inside `quiet()` results of other threads wait.
     """
 
     document: Document
@@ -45,5 +49,8 @@ class Context:
     journal: Journal
     tasks: Tasks
     feed: PictureFeed
+    services: Services | None = None
+    compute: Executor | None = None
+    quiet: Callable[[], AbstractContextManager[None]] = nullcontext
     warm: bool = False
     warmed: Signal[[]] = field(default_factory=Signal)

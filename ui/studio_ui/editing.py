@@ -17,7 +17,10 @@ class Editing:
         self.document = document
         self.began: Signal[[]] = Signal()  # a gesture started: pictures should come quickly
         self.settled: Signal[[]] = Signal()  # it ended: they may take their time again
+        self.done: Signal[[Edit]] = Signal()  # an edit went into the history, or a gesture's last one
+        self.stepped: Signal[[int]] = Signal()  # so many steps back or forward in the history
         self._refuse = refuse
+        self._last: Edit | None = None
         self._gesture: Gesture | None = None
         self._owner: object = None
 
@@ -29,7 +32,12 @@ class Editing:
     def apply(self, edit: Edit) -> bool:
         """Do an edit as one step (a gesture under way is ended first); False when it was refused."""
         self.finish()
-        return self._try(edit.label, lambda: self.document.apply(edit))
+        before = self.document.scene
+        if not self._try(edit.label, lambda: self.document.apply(edit)):
+            return False
+        if self.document.scene is not before:
+            self.done.emit(edit)
+        return True
 
     def begin(self, owner: object, label: str) -> bool:
         """Start a gesture; False while another one is under way."""
@@ -44,7 +52,8 @@ class Editing:
         gesture = self._gesture
         if gesture is None or self._owner is not owner:
             return False
-        return self._try(gesture.label, lambda: gesture.apply(edit))
+        self._last = edit if self._try(gesture.label, lambda: gesture.apply(edit)) else self._last
+        return self._last is edit
 
     def call(self, owner: object, label: str) -> None:
         """Give the gesture another name: what it does became clear while it lasted."""
@@ -54,7 +63,7 @@ class Editing:
     def commit(self, owner: object) -> None:
         """End the gesture as one step."""
         if self._gesture is not None and self._owner is owner:
-            self._end(self.document.commit)
+            self.finish()
 
     def cancel(self, owner: object) -> None:
         """Roll the gesture back."""
@@ -63,8 +72,12 @@ class Editing:
 
     def finish(self) -> None:
         """Commit whatever gesture is under way."""
-        if self._gesture is not None:
-            self._end(self.document.commit)
+        if self._gesture is None:
+            return
+        changed, last = self.document.scene is not self._gesture.start, self._last
+        self._end(self.document.commit)
+        if changed and last is not None:
+            self.done.emit(last)
 
     def cancel_any(self) -> bool:
         """Roll back whatever gesture is under way (Esc); whether there was one."""
@@ -76,20 +89,22 @@ class Editing:
     def undo(self) -> None:
         """One step back."""
         self.finish()
-        self.document.undo()
+        self.go_to(self.document.position - 1)
 
     def redo(self) -> None:
         """One step forward."""
         self.finish()
-        self.document.redo()
+        self.go_to(self.document.position + 1)
 
     def go_to(self, position: int) -> None:
         """Show any step of the history."""
         self.finish()
-        self.document.go_to(position)
+        before = self.document.position
+        if self.document.go_to(position):
+            self.stepped.emit(position - before)
 
     def _end(self, how: Callable[[], None]) -> None:
-        self._gesture = self._owner = None
+        self._gesture = self._owner = self._last = None
         how()
         self.settled.emit()
 

@@ -14,6 +14,7 @@ from studio_ui.settings import Settings
 from studio_ui.theme import PANEL_WIDTH
 
 _VERSION = 1  # stored layouts of another number are left alone
+_HIDDEN = ("console",)  # at first
 _TABS = (("history", "jobs", "log"), ("properties", "materials", "lighting", "shading"))
 
 
@@ -48,6 +49,9 @@ class Layout:
         window.resizeDocks([docks["outliner"], docks["history"]], [560, 260], Qt.Orientation.Vertical)
         sides = [docks["outliner"], docks["properties"]]
         window.resizeDocks(sides, [PANEL_WIDTH - 40, PANEL_WIDTH + 20], Qt.Orientation.Horizontal)
+        window.resizeDocks([docks["console"]], [230], Qt.Orientation.Vertical)
+        for name in _HIDDEN:
+            docks[name].hide()
         self._first = QByteArray()
 
     def handlers(self) -> dict[str, Callable[[], object]]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
-from PySide6.QtCore import QTimer
+from PySide6.QtCore import Qt, QTimer
 from PySide6.QtGui import QCloseEvent, QDragEnterEvent, QDropEvent
 from PySide6.QtWidgets import QMainWindow, QToolBar, QWidget
 
@@ -33,7 +33,8 @@ from studio_ui.layout import Layout
 from studio_ui.menus import Menus
 from studio_ui.palette import Palette, menu_entries
 from studio_ui.panels.all import all_panels
-from studio_ui.panels.panel import stacked
+from studio_ui.panels.console import ConsoleDoor
+from studio_ui.panels.panel import Panel, stacked
 from studio_ui.project_files import ProjectFiles
 from studio_ui.quality import QualityControl
 from studio_ui.settings import Settings
@@ -105,7 +106,7 @@ class MainWindow(QMainWindow):
         self.transfer = Transfer(context, self.ask, self.viewing.frame_all, self.files.beside)
         self.canvas = CanvasChoice(viewport, settings, context.journal.write)
         self.appearance = Appearance(settings, viewport, self.canvas)
-        self.layout_ = Layout(self, settings, all_panels(context, self.transfer.load_environment))
+        self.layout_ = Layout(self, settings, self._panels())
         self.panels, self.docks = self.layout_.panels, self.layout_.docks
         self.palette_ = Palette(
             self, settings, [lambda: menu_entries(self.menuBar(), self.actions_.reasons())]
@@ -121,8 +122,13 @@ class MainWindow(QMainWindow):
             self.layout_,
             self.palette_,
             Choosing(context),
+            ConsoleDoor(self.panels["console"], self.docks["console"]),
             Help(self, context.host, self.viewing.mouse),
         ]
+
+    def _panels(self) -> list[tuple[Panel, Qt.DockWidgetArea]]:
+        load, save = self.transfer.load_environment, self.files.save
+        return all_panels(self.context, load, self.ask, self.settings, save)
 
     def handlers(self) -> dict[str, Callable[[], object]]:
         """By action id."""

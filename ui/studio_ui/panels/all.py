@@ -6,7 +6,9 @@ from collections.abc import Callable
 
 from PySide6.QtCore import Qt
 
+from studio_ui.ask import Ask
 from studio_ui.context import Context
+from studio_ui.panels.console import ConsolePanel
 from studio_ui.panels.history import HistoryPanel
 from studio_ui.panels.jobs import JobsPanel
 from studio_ui.panels.lighting import LightingPanel
@@ -16,13 +18,19 @@ from studio_ui.panels.outliner import OutlinerPanel
 from studio_ui.panels.panel import Panel
 from studio_ui.panels.properties import PropertiesPanel
 from studio_ui.panels.shading import ShadingPanel
+from studio_ui.settings import Settings
 
 
 def all_panels(
-    context: Context, load_environment: Callable[[], object]
+    context: Context,
+    load_environment: Callable[[], object],
+    ask: Ask,
+    settings: Settings,
+    save: Callable[[], object],
 ) -> list[tuple[Panel, Qt.DockWidgetArea]]:
     """The panels in the order of the Window menu; tabs are in `layout`."""
     left, right = Qt.DockWidgetArea.LeftDockWidgetArea, Qt.DockWidgetArea.RightDockWidgetArea
+    below = Qt.DockWidgetArea.BottomDockWidgetArea
     return [
         (OutlinerPanel(context), left),
         (HistoryPanel(context), left),
@@ -32,4 +40,5 @@ def all_panels(
         (MaterialsPanel(context), right),
         (LightingPanel(context, load_environment), right),
         (ShadingPanel(context), right),
+        (ConsolePanel(context, ask, settings, save), below),
     ]
