@@ -17,8 +17,17 @@ from studio_core.contract import ImportedModel, Registry
 from studio_core.edits import Add
 from studio_core.errors import InputError, LucarneError
 from studio_core.params import ParamInfo, Value, check, param_infos, parse
-from studio_core.scene.geometry import Geometry
-from studio_core.scene.nodes import Camera, Environment, Material, MeshObject, Scene, new_id
+from studio_core.photographs import flat_floor, shadow_floor
+from studio_core.scene.nodes import (
+    FAR_AWAY,
+    ON_THE_GROUND,
+    Camera,
+    Environment,
+    Material,
+    MeshObject,
+    Scene,
+    new_id,
+)
 from studio_core.scene.room import Room
 from studio_core.scene.transform import Transform, axis_angle, looking
 from studio_core.session import View
@@ -114,11 +123,7 @@ def load_model(path: Path, registry: Registry, unit: float = 1.0) -> ImportedMod
 
 def floor(size: float) -> tuple[MeshObject, Material]:
     """A square floor at y = 0, facing up, textured once a metre."""
-    half = size / 2
-    positions = np.array([[-half, 0, half], [half, 0, half], [half, 0, -half], [-half, 0, -half]], np.float32)
-    uvs = np.array([[0, 0], [size, 0], [size, size], [0, size]], np.float32)
-    normals = np.tile(np.array([0, 1, 0], np.float32), (4, 1))
-    geometry = Geometry(positions, np.array([[0, 1, 2], [0, 2, 3]], np.uint32), normals, uvs)
+    geometry = flat_floor(size, size)
     material = Material(
         id=new_id("material"), name="Floor", model="lambert", values={"base_color": (0.5, 0.5, 0.5)}
     )
@@ -187,9 +192,17 @@ def build(options: argparse.Namespace, registry: Registry) -> tuple[Scene, list[
     if options.env is not None:
         from studio_core.imaging.environment import load_environment
 
-        image, found = load_environment(options.env)
-        notes += [f"{options.env.name}: {note}" for note in found]
-        scene = scene.with_nodes(Environment(id=new_id("environment"), name=options.env.stem, image=image))
+        image, told = load_environment(options.env)
+        notes += [f"{options.env.name}: {note}" for note in told]
+        seen = {"projection": ON_THE_GROUND if options.ground is not None else FAR_AWAY}
+        if options.ground is not None:
+            height = check("--ground", param_infos(Environment)["ground_height"], options.ground)
+            seen["ground_height"] = height
+        scene = scene.with_nodes(
+            Environment(id=new_id("environment"), name=options.env.stem, image=image, **seen)
+        )
+    if options.shadow_floor:
+        scene = shadow_floor(scene)(scene)
     for text in options.material:
         scene = set_material(scene, text, registry)
     inside = next(scene.of(Room), None) if not (options.camera or any(scene.of(Camera))) else None

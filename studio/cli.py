@@ -187,7 +187,14 @@ def parser() -> argparse.ArgumentParser:
     )
     new.add_argument("--unit", choices=("m", "cm", "mm", "in"), default="m", help="of the mesh files")
     new.add_argument("--env", type=Path, metavar="FILE", help="HDR environment")
+    new.add_argument(
+        "--ground",
+        type=float,
+        metavar="HEIGHT",
+        help="see the environment on the ground; it was photographed so many metres above it",
+    )
     new.add_argument("--floor", type=float, metavar="SIZE", help="a square floor, metres")
+    new.add_argument("--shadow-floor", action="store_true", help="a floor that only catches shadows")
     _room_options(new)
     new.add_argument(
         "--material",

@@ -14,8 +14,11 @@ _STRAIGHT = 1e-9  # sine of the smallest angle that makes the box of a mesh larg
 
 
 def scene_bounds(scene: Scene) -> tuple[F64, F64]:
-    """Lowest and highest corner of all shown meshes, (3,) each; a unit box when there are none."""
-    corners = []
+    """Lowest and highest corner of all shown meshes, (3,) each; a unit box when there are none.
+
+    What only catches shadows is left out where there is anything else.
+    """
+    found: dict[bool, list[F64]] = {False: [], True: []}
     for node in scene.of(MeshObject):
         if scene.shown(node.id) and len(node.geometry.positions):
             matrix = scene.world(node.id).matrix()
@@ -23,11 +26,17 @@ def scene_bounds(scene: Scene) -> tuple[F64, F64]:
             box = np.array(
                 [[x, y, z] for x in (low[0], high[0]) for y in (low[1], high[1]) for z in (low[2], high[2])]
             )
-            corners.append(box @ matrix[:3, :3].T + matrix[:3, 3])
+            found[only_catches(scene, node)].append(box @ matrix[:3, :3].T + matrix[:3, 3])
+    corners = found[False] or found[True]
     if not corners:
         return np.array([-0.5, 0.0, -0.5]), np.array([0.5, 1.0, 0.5])
     points = np.concatenate(corners)
     return points.min(axis=0), points.max(axis=0)
+
+
+def only_catches(scene: Scene, node: MeshObject) -> bool:
+    """Whether a mesh belongs to the photographed room: all of it catches shadows."""
+    return bool(node.materials) and all(scene.material(m).catches for m in node.materials)
 
 
 def exact_bounds(scene: Scene, nodes: Iterable[NodeId]) -> tuple[F64, F64] | None:

@@ -8,6 +8,7 @@ from functools import partial
 import numpy as np
 
 from studio_core.edits import Add, Compound, Edit, Move, Remove, Reparent, SetFields, duplicate
+from studio_core.photographs import stand_in_photograph
 from studio_core.scene.arranging import is_locked, roots, shifted, turned
 from studio_core.scene.nodes import Camera, Environment, Group, NodeId, Scene, new_id
 from studio_core.scene.standing import dropped
@@ -40,6 +41,7 @@ class Commands:
             "edit.select_all": self.select_all,
             "edit.select_none": lambda: self._context.session.select([]),
             "object.drop": self.drop,
+            "object.photograph": self.stand_in_photograph,
             "object.group": self.group,
             "object.ungroup": self.ungroup,
             "object.hide": self.hide,
@@ -124,6 +126,10 @@ class Commands:
     def drop(self) -> None:
         """Stand on the floor."""
         self._move(dropped, "Drop")
+
+    def stand_in_photograph(self) -> None:
+        """Shadows on the floor of the photographed room, which is seen under the furniture."""
+        self._apply(stand_in_photograph(self._context.document.scene))
 
     def group(self) -> None:
         """A new group around what is chosen."""

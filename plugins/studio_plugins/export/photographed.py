@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from studio_core.scene.bounds import only_catches
 from studio_core.scene.nodes import FAR_AWAY, Environment, Group, MeshObject, Scene
 
 
@@ -11,11 +12,10 @@ def without_catchers(scene: Scene) -> tuple[Scene, list[str]]:
     for node in scene.of(MeshObject):
         if not scene.shown(node.id):
             continue
-        catches = {scene.material(material).catches for material in node.materials}
-        if catches == {True}:
+        if only_catches(scene, node):
             left.append(Group(id=node.id, name=node.name, parent=node.parent, transform=node.transform))
             notes.append(f"{node.name} only catches shadows; it was left out.")
-        elif True in catches:
+        elif any(scene.material(material).catches for material in node.materials):
             notes.append(f"{node.name} catches shadows in places; these are ordinary surfaces in the file.")
     return scene.with_nodes(*left), notes
 

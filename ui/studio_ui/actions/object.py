@@ -19,6 +19,8 @@ ITEMS: tuple[Item, ...] = (
                "Drag what is chosen to turn it; Ctrl in steps of 15°", icon="rotate",
                bar=True, group="tool", checked="tool_rotate", canvas=True),
     SEPARATOR,
+    ActionSpec("object.photograph", "Stand in the photograph", "Object", "",
+               "A floor for shadows on the photographed room, whose picture is seen on the ground"),
     ActionSpec("object.drop", "Drop to floor", "Object", "End", "Let what is chosen stand on the floor",
                icon="drop", bar=True, enabled="movable"),
     _nudge("left", "Nudge left", "Left"),
