@@ -84,7 +84,7 @@ def test_a_suns_power_lands_in_its_own_leaves(height: int, where: float, k: int,
     pixels[round(where * (height - 1)), 7, 0] = 1e5
     leaves = integrate_environment(pixels, turn(seed), k, WORKERS)
     np.testing.assert_allclose(leaves[:, 1], 1.0, rtol=1e-5)
-    np.testing.assert_allclose(np.median(leaves[:, 0]), 1.0, rtol=2e-2)
+    np.testing.assert_allclose(np.median(leaves[:, 0]), 1.0, rtol=5e-2)  # lost, it would be many times that
 
 
 def test_power_is_the_pixels_sum_away_from_the_poles() -> None:
