@@ -6,7 +6,6 @@ A file appears whole or not at all: it is written beside its place, then put the
 from __future__ import annotations
 
 import os
-import secrets
 import tempfile
 from collections.abc import Mapping
 from pathlib import Path
@@ -15,7 +14,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from studio_core.errors import InputError
+from studio_core.imaging.rows import Numbers, RowWriter
 
 Pixels = npt.NDArray[Any]
 _NAMES = {1: ("Y",), 3: ("R", "G", "B"), 4: ("R", "G", "B", "A")}
@@ -80,33 +79,7 @@ def _bytes_of(pixels: Pixels) -> Pixels:
 def _write(
     path: Path, suffix: str, pixels: Pixels, names: tuple[str, ...], metadata: Mapping[str, str | float | int]
 ) -> None:
-    import OpenImageIO as oiio  # noqa: N813 - its customary name
-
-    height, width, channels = pixels.shape
-    spec = oiio.ImageSpec(width, height, channels, oiio.UINT8 if pixels.dtype == np.uint8 else oiio.FLOAT)
-    spec.channelnames = names
-    for key, value in metadata.items():
-        spec.attribute(key, value)
-    if not path.parent.is_dir():
-        raise InputError(f"{path} cannot be written: there is no folder {path.parent}")
-    beside = path.with_name(f".{path.stem[:40]}-{secrets.token_hex(6)}{suffix}")
-    try:
-        output = oiio.ImageOutput.create(str(beside))
-        if output is None:
-            raise InputError(f"{path} cannot be written: {_line(oiio.geterror())}")
-        done = output.open(str(beside), spec) and output.write_image(np.ascontiguousarray(pixels))
-        done = output.close() and done
-        failure = _line(output.geterror())
-        if failure or not done:
-            raise InputError(f"{path} cannot be written: {failure or 'the disk may be full'}")
-        with beside.open("rb+") as file:
-            os.fsync(file.fileno())
-        beside.replace(path)
-    except OSError as error:
-        raise InputError(f"{path} cannot be written: {error.strerror or error}") from None
-    finally:
-        beside.unlink(missing_ok=True)
-
-
-def _line(text: str) -> str:
-    return " ".join(str(text).split()).rstrip(".")
+    height, width, _ = pixels.shape
+    numbers: Numbers = "uint8" if pixels.dtype == np.uint8 else "float"
+    with RowWriter(path, width, height, names, numbers, metadata, suffix=suffix) as rows:
+        rows.write(pixels)

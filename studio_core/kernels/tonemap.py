@@ -60,6 +60,23 @@ def tonemap(
     return made.reshape(linear.shape)
 
 
+def tonemap16(
+    linear: npt.NDArray[np.floating[Any]], exposure: float = 0.0, kind: str = "srgb"
+) -> npt.NDArray[np.uint16]:
+    """The same with 16 bits: for pictures that somebody will grade or print."""
+    if kind not in KINDS:
+        raise ValueError(f"there is no view {kind!r}; known: {', '.join(KINDS)}")
+    flat = np.ascontiguousarray(linear, np.float32).reshape(-1, 3)
+    made = np.empty(flat.shape, np.uint16)
+    for start in range(0, len(flat), _BLOCK):
+        light = flat[start : start + _BLOCK] * np.float32(2.0**exposure)
+        if kind == "filmic":
+            light = _film(light)
+        np.fmin(np.fmax(light, np.float32(0), out=light), np.float32(1), out=light)
+        made[start : start + _BLOCK] = np.rint(65535 * _curve(light, kind == "raw"))
+    return made.reshape(linear.shape)
+
+
 def prepare() -> None:
     """Compiles or loads the kernel, on a thread that may take its time, before a window shows a picture."""
     tonemap(np.zeros((1, THUMBNAIL + 1, 3), np.float32))
@@ -78,7 +95,12 @@ def _film(light: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:
 @cache
 def _table(raw: bool) -> npt.NDArray[np.uint8]:
     """(65536,) the byte of each linear value 0…1: plain, or through the sRGB curve (IEC 61966-2-1)."""
-    x = np.arange(_STEPS) / (_STEPS - 1)
-    curve = x if raw else np.where(x <= 0.0031308, 12.92 * x, 1.055 * np.power(x, 1 / 2.4) - 0.055)
-    made: npt.NDArray[np.uint8] = np.rint(curve * 255).astype(np.uint8)
+    made: npt.NDArray[np.uint8] = np.rint(_curve(np.arange(_STEPS) / (_STEPS - 1), raw) * 255).astype(
+        np.uint8
+    )
     return made
+
+
+def _curve(x: npt.NDArray[Any], raw: bool) -> npt.NDArray[Any]:
+    """Display values 0 … 1 of linear ones."""
+    return x if raw else np.where(x <= 0.0031308, 12.92 * x, 1.055 * np.power(x, 1 / 2.4) - 0.055)
