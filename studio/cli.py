@@ -14,7 +14,7 @@ from studio_core import __version__
 from studio_core.errors import InputError, LucarneError
 
 VERBS = (
-    *("demo", "new", "info", "render", "radiance", "precompute", "export"),
+    *("demo", "new", "info", "render", "frames", "radiance", "precompute", "export"),
     *("script", "bench", "stress", "doctor"),
 )
 BAD_INPUT, OUR_FAULT, INTERRUPTED, NOBODY_READS = 2, 70, 130, 141
@@ -108,7 +108,8 @@ def _run(options: argparse.Namespace) -> int:
     from studio import verbs
     from studio.headless import Headless
 
-    program = Headless(quiet=options.quiet, threads=options.threads)
+    progress = getattr(options, "progress", "text")
+    program = Headless(quiet=options.quiet, threads=options.threads, progress=progress)
     try:
         if options.verb in ("bench", "stress"):
             if options.json is not None:
@@ -124,6 +125,10 @@ def _run(options: argparse.Namespace) -> int:
                 from studio.doctor import doctor
 
                 return doctor(options, program)
+            if options.verb in ("render", "frames"):
+                from studio import verbs_pictures
+
+                return getattr(verbs_pictures, options.verb)(options, program) or 0
             if options.verb == "precompute":
                 from studio.verbs_precompute import precompute
 
@@ -219,6 +224,29 @@ def parser() -> argparse.ArgumentParser:
     render.add_argument("-o", "--out", type=Path, required=True, metavar="OUT.(png|exr)")
     _backend_options(render)
     _picture_options(render)
+    render.add_argument("--preview", type=Path, metavar="PNG", help="a small picture of what is there so far")
+
+    frames = verb("frames", "numbered pictures: around a point, of turning light, or along a path of cameras")
+    frames.add_argument("project", type=Path, metavar="PROJECT")
+    out = "DIR/NAME.(png|exr), numbered: NAME_0001.png"
+    frames.add_argument("-o", "--out", type=Path, required=True, metavar="OUT", help=out)
+    kind = frames.add_mutually_exclusive_group(required=True)
+    kind.add_argument("--turntable", type=int, metavar="N", help="N pictures around what the camera looks at")
+    kind.add_argument("--relight", type=int, metavar="N", help="N pictures while the light goes around")
+    kind.add_argument("--path", metavar="NAMES", help="a smooth path through cameras, with commas between")
+    frames.add_argument("--frames", type=int, metavar="N", help="how many pictures along the path")
+    frames.add_argument(
+        "--degrees", type=float, default=360.0, metavar="D", help="of the turn (default: 360)"
+    )
+    frames.add_argument("--around", metavar="NAME|x,y,z", help="turn around this thing or point")
+    frames.add_argument("--closed", action="store_true", help="the path comes back to its first camera")
+    frames.add_argument("--ease", action="store_true", help="start and stop slowly")
+    even = "as many pictures between any two cameras, instead of even speed"
+    frames.add_argument("--uneven", action="store_true", help=even)
+    frames.add_argument("--resume", action="store_true", help="keep pictures of that size that are there")
+    frames.add_argument("--sheet", type=Path, metavar="PNG", help="all of them, small, on one sheet")
+    _backend_options(frames)
+    _picture_options(frames)
 
     radiance = verb("radiance", "radiance and irradiance of every shading vertex as .npz")
     radiance.add_argument("project", type=Path, metavar="PROJECT")
@@ -299,6 +327,16 @@ def _picture_options(verb: argparse.ArgumentParser) -> None:
         metavar="N",
         help="N×N samples a pixel; from 2 on 16 at edges",
     )
+    bits = "a channel: 8 or 16 in PNG (default: 8), 16 or 32 in EXR (default: 32)"
+    verb.add_argument("--bits", type=int, choices=(8, 16, 32), default=0, metavar="N", help=bits)
+    verb.add_argument(
+        "--alpha", action="store_true", help="transparent where nothing is before the background"
+    )
+    verb.add_argument("--lights", action="store_true", help="a layer for every light as well (EXR)")
+    verb.add_argument("--dpi", type=float, default=0.0, metavar="N", help="dots per inch that the file names")
+    progress = "on stderr: for people, or one JSON line a step for a program"
+    verb.add_argument("--progress", choices=("text", "json"), default="text", help=progress)
+    verb.set_defaults(preview=None)
     verb.add_argument(
         "--measure",
         type=int,

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import argparse
-import dataclasses
 import json
-import math
 import os
 import runpy
 import secrets
@@ -13,7 +11,7 @@ import shutil
 import sys
 import traceback
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, nullcontext, suppress
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -22,12 +20,7 @@ import numpy as np
 from studio.headless import Headless
 from studio_core.contract import ShadingBackend
 from studio_core.errors import InputError, ProjectError
-from studio_core.scene.nodes import Light, MeshObject, Scene
-
-PICTURES = (".png", ".exr")
-MOST_PIXELS = 16384
-MOST_EXPOSURE = 64.0
-SAMPLE_BYTES = 64  # of a picture's sample while it is made
+from studio_core.scene.nodes import Light, Scene
 
 
 def result(options: argparse.Namespace, program: Headless, values: dict[str, Any], text: str) -> None:
@@ -127,85 +120,6 @@ def chosen_backend(
         return backend, backend_params(backend, values)
     except InputError as error:
         raise InputError(f"--param: {error}") from None
-
-
-def parse_size(text: str) -> tuple[int, int]:
-    """(width, height) from WxH."""
-    try:
-        width, height = (int(part) for part in text.lower().split("x"))
-    except ValueError:
-        raise InputError(f"--size {text!r}: write WIDTHxHEIGHT") from None
-    if not (1 <= width <= MOST_PIXELS and 1 <= height <= MOST_PIXELS):
-        raise InputError(f"--size {text!r}: expected 1 to {MOST_PIXELS} pixels each way")
-    return width, height
-
-
-def _check_picture(options: argparse.Namespace) -> tuple[int, int]:
-    """(width, height); InputError for whatever can be told to be wrong before the work."""
-    check_target(options.out, PICTURES, "pictures")
-    width, height = parse_size(options.size)
-    if not abs(options.exposure) <= MOST_EXPOSURE:
-        raise InputError(
-            f"--exposure {options.exposure:g}: expected -{MOST_EXPOSURE:g} to {MOST_EXPOSURE:g} EV"
-        )
-    if options.measure is not None and not 1 <= options.measure <= 100_000:
-        raise InputError(f"--measure {options.measure}: expected 1 to 100000 places")
-    needed, there = width * height * options.antialias**2 * SAMPLE_BYTES, memory()
-    if needed > there:
-        raise InputError(
-            f"--size {options.size} with --antialias {options.antialias} needs about"
-            f" {needed / 1e9:.0f} GB of memory, and this machine has {there / 1e9:.0f} GB"
-        )
-    return width, height
-
-
-def memory() -> float:
-    """Bytes of memory of this machine; inf where that cannot be told."""
-    with suppress(AttributeError, ValueError, OSError):
-        return float(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"))
-    return math.inf
-
-
-def render(options: argparse.Namespace, program: Headless) -> None:
-    """`lucarne render`."""
-    from studio_core.imaging.picture import write_picture
-    from studio_core.shading.offline import measured_picture, scene_view
-
-    width, height = _check_picture(options)
-    backend, params = chosen_backend(options, program)
-    scene = open_scene(options.project)
-    if not any(scene.shown(node.id) for node in scene.of(MeshObject)):
-        program.say(f"{options.project} shows no mesh: the picture is background alone")
-    if not any(scene.shown(light.id) for light in scene.of(Light)):
-        program.say(f"{options.project} has no light: the picture is black")
-    view = scene_view(scene, options.camera, width, height)
-    view = dataclasses.replace(view, antialias=options.antialias, fine_edges=options.antialias > 1)
-    with program.job("Rendering") as job:
-        places = options.measure or 0
-        made, error = measured_picture(scene, view, backend, params, program.services, places, job)
-    write_picture(options.out, made.linear, exposure=options.exposure, kind=options.tonemap)
-    finite = bool(np.isfinite(made.linear).all())
-    if not finite:
-        program.say(f"{options.out}: some pixels are not finite")
-    vertices = len(made.radiance.valid)
-    values = {
-        "project": str(options.project),
-        "picture": str(options.out),
-        "backend": backend.id,
-        "width": width,
-        "height": height,
-        "vertices": vertices,
-        "shaded": int(made.radiance.valid.sum()),
-        "directions": made.radiance.directions,
-        "finite": finite,
-        "mean": float(made.linear.mean(dtype=np.float64)) if finite else None,
-        "counts": dict(made.radiance.counts),
-    }
-    text = f"{options.out}: {width}×{height}, {vertices} vertices"
-    if error is not None:
-        values["error"] = error.as_dict()
-        text += f", error {error.picture}"
-    result(options, program, values, text)
 
 
 def radiance(options: argparse.Namespace, program: Headless) -> None:
@@ -341,6 +255,7 @@ def demo(options: argparse.Namespace, program: Headless) -> int:
     """`lucarne demo`: the sample room in a window, or rendered where there is no display."""
     from studio.display import why_no_window
     from studio.samples import sample
+    from studio.verbs_pictures import check_picture, render
 
     options.project = sample()
     if options.headless or options.out is not None:
@@ -353,7 +268,7 @@ def demo(options: argparse.Namespace, program: Headless) -> int:
         return run_window(options.project)
     if options.out is None:
         options.out = Path("living-room.png")
-    _check_picture(options)
+    check_picture(options, options.out)
     chosen_backend(options, program)
     program.say(f"Rendering the sample room to {options.out.resolve()} ({reason})")
     render(options, program)

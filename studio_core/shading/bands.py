@@ -108,7 +108,7 @@ class PictureMaker:
         assert self._frame is not None
         return ErrorMeter(self._services, places)(self._pipeline, self._frame, job)
 
-    def bands(self, job: Job, parts: Parts | None = None, most: int = BAND_SAMPLES) -> Iterator[Band]:
+    def bands(self, job: Job, parts: Parts | None = None, most: int | None = None) -> Iterator[Band]:
         """The picture that was last shaded, from the top down."""
         radiance, frame = self.radiance, self._frame
         assert radiance is not None
@@ -123,7 +123,7 @@ class PictureMaker:
             return
         primary = LocatedPrimaryStage(self._services)
         given = {Surfaces: radiance.surfaces, Casters: casters}
-        for top, height in rows_of(view, most):
+        for top, height in rows_of(view, most or BAND_SAMPLES):
             job.checkpoint(top, view.height)
             above, below = min(MARGIN, top), min(MARGIN, view.height - top - height)
             part = view.part(top - above, above + height + below)
@@ -151,10 +151,10 @@ class PictureMaker:
             dark = dataclasses.replace(radiance, layers={})
             alpha = np.float32(1) - made(_white(scene, sky), dark)[:, :, 0]
         if parts.lights:
-            for node, layer in radiance.layers.items():
-                if isinstance(scene.nodes.get(node), Light) and scene.shown(node):
-                    behind = scene if sky is not None and node == sky.id and not parts.transparent else bare
-                    lights[node] = made(behind, dataclasses.replace(radiance, layers={node: layer}))
+            for node in layers_of(scene, radiance):
+                behind = scene if sky is not None and node == sky.id and not parts.transparent else bare
+                layer = {node: radiance.layers[node]}
+                lights[node] = made(behind, dataclasses.replace(radiance, layers=layer))
         return Band(hits.view.top + skip, linear, alpha, frozen_map(lights))
 
 
@@ -171,6 +171,11 @@ class _Rounds(JobPart):
         stage = (pipeline.current + share) / len(pipeline.stages) if not pipeline.rounds else share
         half = 0.5**pipeline.rounds
         super().at((1 - half) + 0.5 * half * stage)
+
+
+def layers_of(scene: Scene, radiance: Radiance) -> tuple[NodeId, ...]:
+    """The lights that a picture of the scene is made of."""
+    return tuple(n for n in radiance.layers if isinstance(scene.nodes.get(n), Light) and scene.shown(n))
 
 
 def rows_of(view: View, most: int) -> list[tuple[int, int]]:

@@ -19,6 +19,7 @@ from scenes import little_scene
 
 import studio.display
 import studio.verbs
+import studio.verbs_pictures
 from studio.cli import BAD_INPUT, INTERRUPTED, NOBODY_READS, OUR_FAULT, VERBS, main, parser
 from studio_core.errors import LucarneError
 from studio_core.imaging.encode import write_exr
@@ -235,8 +236,8 @@ def test_bad_input_is_refused_in_one_line(
 def test_a_picture_larger_than_the_memory_is_refused(
     files: Path, run: Run, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(studio.verbs, "memory", lambda: 8e9)
-    refused(run(*RENDER, "--size", "16384x16384"), "--size 16384x16384", "69 GB", "8 GB")
+    monkeypatch.setattr(studio.verbs_pictures, "memory", lambda: 5e8)
+    refused(run(*RENDER, "--size", "16384x16384"), "--size 16384x16384", "0.8 GB", "0.5 GB")
 
 
 @pytest.mark.skipif(not Path("/proc/self").is_dir(), reason="needs a folder that takes no file")
@@ -404,6 +405,7 @@ def test_no_verb_without_a_window_loads_qt(files: Path) -> None:
         ["new", "made.lucarne", "--mesh", "box.obj", "--env", "sky.exr", "--floor", "3"],
         ["info", "made.lucarne"],
         ["render", "made.lucarne", "-o", "x.png", *SMALL],
+        ["frames", "made.lucarne", "--turntable", "1", "-o", "x.png", *SMALL],
         ["radiance", "made.lucarne", "-o", "x.npz", *QUICK],
         ["export", "made.lucarne", "-o", "x.glb"],
         ["export", "made.lucarne", "-o", "mitsuba"],
@@ -463,6 +465,7 @@ def test_help_and_version_are_successes(run: Run) -> None:
 
 def test_render_png_and_exr(files: Path, run: Run) -> None:
     said = only_json(run("render", "room.lucarne", "-o", "x.exr", *SMALL, "--json"))
+    assert set(said.pop("seconds")) == {"shading", "composing"}
     assert said | {"counts": {}, "mean": 0, "vertices": 0, "shaded": 0} == {
         "project": "room.lucarne",
         "picture": "x.exr",
@@ -790,3 +793,147 @@ def test_measuring_nowhere_is_refused(run: Run, room: Path) -> None:
     said = run("render", room, "-o", "x.png", "--measure", 0)
     assert said.status == 2
     assert "--measure" in said.err
+
+
+# --- pictures and series of them ----------------------------------------------------------------------
+
+
+def read(path: Path) -> np.ndarray:
+    with ImageDecoder() as decoder:
+        return np.asarray(decoder.read(path).pixels)
+
+
+def test_render_with_alpha_layers_and_a_preview(files: Path, run: Run) -> None:
+    more = ("--alpha", "--lights", "--bits", "16", "--dpi", "300", "--preview", "small.png")
+    assert run("render", "room.lucarne", "-o", "x.exr", *SMALL, *more).status == 0
+    assert read(files / "x.exr").shape == (18, 32, 4)
+    assert read(files / "small.png").shape == (18, 32, 3)
+    assert run("render", "room.lucarne", "-o", "x.png", *SMALL, "--alpha", "--bits", "16").status == 0
+    assert read(files / "x.png").shape == (18, 32, 4)
+
+
+def test_a_picture_in_bands_is_the_picture_in_one_piece(
+    files: Path, run: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    everywhere = ("--param", "everywhere=true", "--param", "refine=false")
+    assert run("render", "room.lucarne", "-o", "one.exr", *SMALL, *everywhere).status == 0
+    monkeypatch.setattr("studio_core.shading.bands.GUIDE_SAMPLES", 100)
+    monkeypatch.setattr("studio_core.shading.bands.BAND_SAMPLES", 160)
+    assert run("render", "room.lucarne", "-o", "bands.exr", *SMALL, *everywhere).status == 0
+    assert np.array_equal(read(files / "one.exr"), read(files / "bands.exr"))
+
+
+def test_a_turntable_is_a_series_that_begins_with_the_cameras_picture(files: Path, run: Run) -> None:
+    said = only_json(
+        run(
+            "frames", "room.lucarne", "--turntable", 3, "-o", "turn.png", *SMALL, "--sheet", "s.png", "--json"
+        )
+    )
+    assert said["frames"] == ["turn_0001.png", "turn_0002.png", "turn_0003.png"]
+    assert (said["kept"], said["width"], said["finite"]) == (0, 32, True)
+    run("render", "room.lucarne", "-o", "x.png", *SMALL)
+    one, two, three = (read(files / name) for name in said["frames"])
+    assert np.array_equal(one, read(files / "x.png"))
+    assert not np.array_equal(one, two)
+    assert not np.array_equal(two, three)
+    sheet = read(files / "s.png")
+    places = [(6, 6), (6, 44), (30, 6)]  # two in a row
+    cells = [sheet[top : top + 18, left : left + 32] for top, left in places]
+    assert all(np.array_equal(cell, frame) for cell, frame in zip(cells, (one, two, three), strict=True))
+
+
+def test_a_series_goes_on_where_it_was_interrupted(files: Path, run: Run) -> None:
+    turn = ("frames", "room.lucarne", "--relight", 3, "--degrees", 90, "-o", "light.png", *SMALL)
+    assert run(*turn).status == 0
+    whole = [read(files / f"light_000{n}.png") for n in (1, 2, 3)]
+    (files / "light_0002.png").unlink()
+    (files / "light_0003.png").write_bytes((files / "light_0003.png").read_bytes()[:80])
+    before = (files / "light_0001.png").stat().st_mtime_ns
+    assert only_json(run(*turn, "--resume", "--json"))["kept"] == 1
+    assert (files / "light_0001.png").stat().st_mtime_ns == before
+    again = [read(files / f"light_000{n}.png") for n in (1, 2, 3)]
+    assert all(np.array_equal(a, b) for a, b in zip(whole, again, strict=True))
+    assert not np.array_equal(whole[0], whole[1])
+
+
+def test_a_path_leads_from_camera_to_camera(files: Path, run: Run) -> None:
+    cameras = ("--camera", "from=3,2,3:to=0,0,0", "--camera", "from=0,5,0.01:to=0,0,0:fov=30")
+    run("new", "two.lucarne", "--mesh", "box.obj", "--env", "sky.exr", *cameras)
+    path = ("frames", "two.lucarne", "--path", "Camera, Camera 2", "--frames", 3, "-o", "p.exr", *SMALL)
+    assert run(*path, "--ease").status == 0
+    for number, name in ((1, "Camera"), (3, "Camera 2")):
+        run("render", "two.lucarne", "-o", "x.exr", *SMALL, "--camera", name)
+        np.testing.assert_allclose(
+            read(files / f"p_000{number}.exr"), read(files / "x.exr"), rtol=1e-4, atol=1e-4
+        )
+
+
+def test_progress_as_json_tells_every_frame(files: Path, run: Run) -> None:
+    said = run("frames", "room.lucarne", "--turntable", 2, "-o", "t.png", *SMALL, "--progress", "json")
+    lines = [json.loads(line) for line in said.err.splitlines()]
+    assert [line["number"] for line in lines if "frame" in line] == [1, 2]
+    steps = [line for line in lines if "done" in line]
+    assert steps
+    assert all(0 <= line["done"] <= line["total"] for line in steps)
+    assert [line["done"] for line in steps] == sorted(line["done"] for line in steps)
+
+
+FRAMES = ("frames", "room.lucarne", "-o", "f.png")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (FRAMES, ("--turntable", "--path")),
+        ((*FRAMES, "--turntable", "0"), ("--turntable 0", "1 to")),
+        ((*FRAMES, "--turntable", "99999"), ("--turntable 99999", "10000")),
+        ((*FRAMES, "--turntable", "3", "--path", "Camera"), ("--path", "--turntable")),
+        ((*FRAMES, "--turntable", "3", "--frames", "3"), ("--frames",)),
+        ((*FRAMES, "--path", "Camera,Camera"), ("--frames",)),
+        ((*FRAMES, "--path", "Camera", "--frames", "3"), ("two cameras",)),
+        ((*FRAMES, "--path", "Camera,Sofa", "--frames", "3"), ("Sofa", "Camera")),
+        ((*FRAMES, "--turntable", "3", "--around", "Sofa"), ("Sofa",)),
+        ((*FRAMES, "--turntable", "3", "--degrees", "nan"), ("--degrees",)),
+        ((*FRAMES, "--turntable", "3", "--sheet", "s.exr"), ("s.exr", ".png")),
+        ((*RENDER, "--bits", "32"), ("x.png", "8 or 16")),
+        ((*RENDER, "--bits", "12"), ("--bits",)),
+        ((*RENDER, "--lights"), ("x.png", ".exr")),
+        ((*RENDER, "--dpi", "-1"), ("--dpi",)),
+        ((*RENDER, "--preview", "no/p.png"), ("no/p.png",)),
+        ((*RENDER, "--size", "16385x10"), ("--size", "16384")),
+    ],
+    ids=lambda value: " ".join(value) if isinstance(value, tuple) else None,
+)
+def test_series_that_cannot_be_are_refused(
+    arguments: tuple[str, ...], words: tuple[str, ...], files: Path, run: Run
+) -> None:
+    before = sorted(files.rglob("*"))
+    refused(run(*arguments), *words)
+    assert sorted(files.rglob("*")) == before
+
+
+@pytest.mark.skipif(os.name != "posix", reason="signals to a child")
+@pytest.mark.parametrize("how", ["killed", "unheard"])
+def test_who_stops_a_series_keeps_whole_frames_alone(how: str, room: Path, tmp_path: Path) -> None:
+    turn = ["frames", str(room), "--turntable", "5000", "-o", str(tmp_path / "t.png"), *SMALL]
+    paths = os.pathsep.join(str(ROOT / folder) for folder in (".", "ui", "plugins"))
+    child = subprocess.Popen(
+        [sys.executable, "-c", COMMAND, *turn, "--progress", "json"],
+        stderr=subprocess.PIPE,
+        env={**os.environ, "PYTHONPATH": paths},
+        text=True,
+    )
+    assert child.stderr is not None
+    for line in child.stderr:
+        if '"frame"' in line:
+            break
+    if how == "killed":
+        child.terminate()
+    else:
+        child.stderr.close()
+    assert child.wait(60) == INTERRUPTED
+    if how == "killed":
+        child.stderr.close()
+    names = sorted(path.name for path in tmp_path.iterdir())
+    assert names == [f"t_{n:04}.png" for n in range(1, len(names) + 1)]
+    assert all(read(path).shape == (18, 32, 3) for path in tmp_path.iterdir())
