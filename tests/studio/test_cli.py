@@ -768,12 +768,12 @@ def test_the_reference_names_every_verb_and_option() -> None:
     (verbs,) = (action for action in parser()._actions if action.dest == "verb")
     assert isinstance(verbs.choices, dict)
     assert list(sections) == list(verbs.choices) == list(VERBS)
-    everywhere = set(re.findall(r"`(--?[a-z]+)", groups["Everywhere"]))
+    everywhere = set(re.findall(r"`(--?[a-z]+(?:-[a-z]+)*)", groups["Everywhere"]))
     for name, verb in verbs.choices.items():
         there = {option for action in verb._actions for option in action.option_strings}
-        told = set(re.findall(r"`(--?[a-z]+)", sections[name]))
+        told = set(re.findall(r"`(--?[a-z]+(?:-[a-z]+)*)", sections[name]))
         for title in re.findall(r"\*([A-Z][\w ]+)\*", sections[name]):
-            told |= set(re.findall(r"`(--?[a-z]+)", groups[title]))
+            told |= set(re.findall(r"`(--?[a-z]+(?:-[a-z]+)*)", groups[title]))
         assert told <= there, name
         assert there - everywhere - {"--out", "-h"} <= told, name
         assert everywhere - there <= {"--json"}, name
