@@ -118,7 +118,9 @@ def _run(options: argparse.Namespace) -> int:
 
             return run(options, program)
         if options.verb == "script":
-            return verbs.script(options, program)
+            from studio.verbs_script import script
+
+            return script(options, program)
         # What libraries and plugins print must not meet a result that a machine reads.
         with contextlib.redirect_stdout(sys.stderr) if options.json else contextlib.nullcontext():
             if options.verb == "doctor":
@@ -264,7 +266,9 @@ def parser() -> argparse.ArgumentParser:
     export.add_argument("project", type=Path, metavar="PROJECT")
     export.add_argument("-o", "--out", type=Path, required=True, metavar="(OUT.glb|DIR)")
 
-    script = verb("script", "run a Python file that uses studio_core", json=False)
+    script = verb("script", "run a Python file with the names of the console", json=False)
+    text = "what the script's names mean; saved where it says save()"
+    script.add_argument("--project", type=Path, metavar="PROJECT", help=text)
     script.add_argument("file", type=Path, metavar="FILE.py")
     script.add_argument("args", nargs=argparse.REMAINDER, metavar="ARGS", help="its sys.argv[1:]")
 

@@ -5,11 +5,8 @@ from __future__ import annotations
 import argparse
 import json
 import os
-import runpy
 import secrets
 import shutil
-import sys
-import traceback
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, nullcontext
 from pathlib import Path
@@ -229,26 +226,6 @@ def export(options: argparse.Namespace, program: Headless) -> None:
         program.say(note)
     values = {"project": str(options.project), "out": str(out), "notes": notes}
     result(options, program, values, f"{out}: {fitting[0].label}")
-
-
-def script(options: argparse.Namespace, program: Headless) -> int:
-    """`lucarne script`: a Python file with `studio_core` at hand, as `__main__`; 1 when it raises."""
-    if not options.file.is_file():
-        raise InputError(f"{options.file}: there is no such file")
-    argv, path = sys.argv, list(sys.path)
-    sys.argv = [str(options.file), *options.args]
-    sys.path.insert(0, str(options.file.resolve().parent))
-    try:
-        runpy.run_path(str(options.file), run_name="__main__")
-    except Exception as error:  # the user's own code: a traceback is what helps
-        trace = error.__traceback__
-        while trace is not None and trace.tb_frame.f_code.co_filename != str(options.file):
-            trace = trace.tb_next
-        traceback.print_exception(type(error), error, trace)
-        return 1
-    finally:
-        sys.argv, sys.path[:] = argv, path
-    return 0
 
 
 def demo(options: argparse.Namespace, program: Headless) -> int:

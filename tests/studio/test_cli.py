@@ -751,6 +751,34 @@ def test_a_script_that_raises_gives_its_own_traceback(text: str, last: str, file
     assert "verbs.py" not in said.err
 
 
+def test_a_script_has_the_names_of_the_console_and_saves_when_it_says_so(files: Path, run: Run) -> None:
+    path = files / "room.lucarne"
+    before = path.read_bytes()
+    text = "move('cube', by=(0, 1, 0))\nassert scene['cube'].transform.translation[1] == 1.5\n"
+    assert run("script", "--project", path, script(files, text)).status == 0
+    assert path.read_bytes() == before
+    said = run("script", "--project", path, script(files, text + "save()\nsave('copy.lucarne')"))
+    assert (said.status, said.err) == (0, "")
+    saved = load(path)
+    assert saved.scene["cube"].transform.translation[1] == 1.5
+    assert saved.history is not None
+    assert saved.history.steps[saved.history.position].label.startswith("Move")
+    assert load(files / "copy.lucarne").history is None
+    assert run("script", script(files, "print(len(scene.nodes))")).out == "0\n"
+    assert "no project to save" in run("script", script(files, "save()")).err
+    refused(run("script", "--project", "nix.lucarne", script(files, text)), "nix.lucarne")
+
+
+def test_a_script_does_not_save_over_a_project_that_is_open(files: Path, run: Run) -> None:
+    path = files / "room.lucarne"
+    before = path.read_bytes()
+    with acquire(path):
+        said = run("script", "--project", path, script(files, "move('cube', by=(0, 1, 0))\nsave()"))
+    assert said.status == 1
+    assert "open" in said.err
+    assert path.read_bytes() == before
+
+
 def test_a_script_may_exit_and_be_stopped(files: Path, run: Run) -> None:
     with pytest.raises(SystemExit) as left:
         run("script", script(files, "import sys; sys.exit(7)"))
