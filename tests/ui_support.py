@@ -30,6 +30,7 @@ from studio_core.shading.pipeline import Inputs, Pipeline
 from studio_ui.ask import Filter, LeftoverChoice, Recover, Unsaved
 from studio_ui.canvas.projection import axes_of, extent, eye_of, project
 from studio_ui.feed import Freshness
+from studio_ui.files.import_question import ImportChoice, ImportQuestion
 from studio_ui.files.leftovers import Leftover
 
 
@@ -39,6 +40,16 @@ def box(size: float = 1.0) -> Geometry:
     faces = [[0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1]]
     faces += [[2, 3, 7], [2, 7, 6], [0, 2, 6], [0, 6, 4], [1, 5, 7], [1, 7, 3]]
     return Geometry(corners * np.float32(size), np.array(faces, np.uint32))
+
+
+def block(width: float, height: float, depth: float, *, lying: bool = False) -> str:
+    """An OBJ box that stands on y = 0, or on z = 0."""
+    corners = [(x * width, y * height, z * depth) for x in (-0.5, 0.5) for y in (0, 1) for z in (-0.5, 0.5)]
+    if lying:
+        corners = [(x, -z, y) for x, y, z in corners]
+    lines = [f"v {x} {y} {z}" for x, y, z in corners]
+    faces = [(1, 2, 4, 3), (5, 7, 8, 6), (1, 5, 6, 2), (3, 4, 8, 7), (1, 3, 7, 5), (2, 6, 8, 4)]
+    return "\n".join([*lines, *(f"f {' '.join(map(str, face))}" for face in faces)])
 
 
 def room() -> Scene:
@@ -146,11 +157,13 @@ class Answers:
     take_over_: bool = True
     version_: int | None = None  # from the newest
     compact_: bool = True
-    unit_: float | None = 1.0
+    import_: Callable[[ImportQuestion], ImportChoice | None] = staticmethod(lambda question: question.guess)
+    photograph_: bool = True
     files: list[Path] = field(default_factory=list)
     target: Path | None = None
     asked: list[str] = field(default_factory=list)
     left: list[Leftover] = field(default_factory=list)
+    questions: list[ImportQuestion] = field(default_factory=list)
     versions: list[Outline] = field(default_factory=list)
 
     def unsaved(self, name: str) -> Unsaved:
@@ -182,9 +195,14 @@ class Answers:
         self.asked.append(f"compact {versions}")
         return self.compact_
 
-    def unit(self, name: str, size: tuple[float, float, float], question: str) -> float | None:
-        self.asked.append(question)
-        return self.unit_
+    def import_options(self, question: ImportQuestion) -> ImportChoice | None:
+        self.asked.append(question.doubt)
+        self.questions.append(question)
+        return self.import_(question)
+
+    def photograph(self, name: str) -> bool:
+        self.asked.append(name)
+        return self.photograph_
 
     def open_files(self, title: str, filters: Sequence[Filter], *, many: bool = False) -> list[Path]:
         return self.files

@@ -167,7 +167,7 @@ def test_new_forgets_the_file(make: Make, tmp_path: Path) -> None:
 def test_an_absurd_size_asks_for_the_unit(driver: Driver, tmp_path: Path) -> None:
     path = tmp_path / "cupboard.obj"
     path.write_text(CUBE)
-    driver.answers.files, driver.answers.unit_ = [path], 0.01
+    driver.answers.files = [path]
     driver.do("file.import")
     driver.idle()
     driver.until(lambda: "cupboard" in driver.labels()[-1])

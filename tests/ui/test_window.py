@@ -20,7 +20,7 @@ from ui_support import Driver, Make, room
 from studio_core.document import Document
 from studio_core.registry import PluginHost
 from studio_ui.actions.catalogue import ACTIONS, specs
-from studio_ui.dialogs import KeysDialog, PluginsDialog, UnitDialog, likely_unit
+from studio_ui.dialogs import KeysDialog, PluginsDialog
 from studio_ui.feed import REST_MS
 from studio_ui.icons import ICONS, icon
 from studio_ui.theme import THEMES
@@ -166,11 +166,7 @@ def test_dialogs_show_what_they_are_for(make: Make) -> None:
     plugins = PluginsDialog(driver.window, host)
     plugins.tree.setCurrentItem(plugins.tree.topLevelItem(0))
     assert "no such thing" in plugins.detail.toPlainText()
-    unit = UnitDialog(driver.window, "chair.obj", (45.0, 50.0, 90.0), "?")
-    assert unit.chosen() == 0.01
     assert KeysDialog(driver.window, [("Undo", "Ctrl+Z")]).windowTitle()
-    assert likely_unit((900.0, 400.0, 700.0)) == 0.001
-    assert likely_unit((1.2, 0.4, 0.7)) == 1.0
 
 
 @pytest.mark.parametrize("name", sorted(ICONS))

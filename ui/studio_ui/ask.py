@@ -9,11 +9,11 @@ from typing import Literal, Protocol
 
 from studio_core.project.lock import Holder
 from studio_core.project.outline import Outline
+from studio_ui.files.import_question import ImportChoice, ImportQuestion
 from studio_ui.files.leftovers import Leftover
 
 Unsaved = Literal["save", "discard", "cancel"]
 Recover = Literal["recovered", "saved", "later"]
-UNITS = {"metres": 1.0, "centimetres": 0.01, "millimetres": 0.001, "inches": 0.0254, "feet": 0.3048}
 
 
 @dataclass(frozen=True)
@@ -63,8 +63,12 @@ class Ask(Protocol):
         """Whether to drop a project's earlier versions for good."""
         ...
 
-    def unit(self, name: str, size: tuple[float, float, float], question: str) -> float | None:
-        """Metres of a file's unit; `size` is width, depth, height at 1."""
+    def import_options(self, question: ImportQuestion) -> ImportChoice | None:
+        """Unit, axis and place of a model that comes in."""
+        ...
+
+    def photograph(self, name: str) -> bool:
+        """Whether an ordinary picture that reaches all around is to light the scene."""
         ...
 
     def open_files(self, title: str, filters: Sequence[Filter], *, many: bool = False) -> list[Path]:

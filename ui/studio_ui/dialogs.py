@@ -7,14 +7,12 @@ from pathlib import Path
 
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import (
-    QButtonGroup,
     QDialog,
     QDialogButtonBox,
     QFileDialog,
     QLabel,
     QMessageBox,
     QPlainTextEdit,
-    QRadioButton,
     QSplitter,
     QTreeWidget,
     QTreeWidgetItem,
@@ -25,13 +23,12 @@ from PySide6.QtWidgets import (
 from studio_core.project.lock import Holder
 from studio_core.project.outline import Outline
 from studio_core.registry import PluginHost
-from studio_ui.ask import UNITS, Filter, LeftoverChoice, Recover, Unsaved
+from studio_ui.ask import Filter, LeftoverChoice, Recover, Unsaved
+from studio_ui.files.import_dialog import ImportDialog
+from studio_ui.files.import_question import ImportChoice, ImportQuestion
 from studio_ui.files.leftovers import Leftover
 from studio_ui.files.recovery_dialog import LeftoversDialog, RecoveryDialog
 from studio_ui.files.versions_dialog import VersionsDialog
-from studio_ui.panels.panel import heading, note
-
-_GUESS = ((0.2, 5.0), (0.05, 15.0))  # metres that the longest side of furniture probably has
 
 
 class Dialogs:
@@ -101,13 +98,26 @@ class Dialogs:
         box.exec()
         return box.clickedButton() is shrink
 
-    def unit(self, name: str, size: tuple[float, float, float], question: str) -> float | None:
-        """The unit, with what the size would be in each."""
-        dialog = UnitDialog(self._parent, name, size, question)
+    def import_options(self, question: ImportQuestion) -> ImportChoice | None:
+        """Unit, axis and place, with a preview beside a person."""
+        dialog = ImportDialog(self._parent, question)
         accepted = dialog.exec()
-        chosen = dialog.chosen()
+        choice = dialog.choice()
         dialog.deleteLater()
-        return chosen if accepted else None
+        return choice if accepted else None
+
+    def photograph(self, name: str) -> bool:
+        """Whether a picture without bright lights will do."""
+        box = QMessageBox(self._parent)
+        box.setIcon(QMessageBox.Icon.Question)
+        box.setWindowTitle("Light from a photograph")
+        box.setText(f"Light the room with {name}?")
+        box.setInformativeText("It holds no bright light as HDR pictures do: shadows will be soft.")
+        use = box.addButton("Light the room", QMessageBox.ButtonRole.AcceptRole)
+        box.addButton(QMessageBox.StandardButton.Cancel)
+        box.setDefaultButton(use)
+        box.exec()
+        return box.clickedButton() is use
 
     def open_files(self, title: str, filters: Sequence[Filter], *, many: bool = False) -> list[Path]:
         """Files to read."""
@@ -138,40 +148,6 @@ class Dialogs:
         """A folder to write into."""
         name = QFileDialog.getExistingDirectory(self._parent, title, self._folder)
         return Path(name) if name else None
-
-
-class UnitDialog(QDialog):
-    """Which unit a model's file has; the likeliest is chosen."""
-
-    def __init__(
-        self, parent: QWidget | None, name: str, size: tuple[float, float, float], question: str
-    ) -> None:
-        super().__init__(parent)
-        self.setWindowTitle("Size of the model")
-        column = QVBoxLayout(self)
-        column.setSpacing(8)
-        column.addWidget(heading(f"Which unit does {name} have?"))
-        column.addWidget(note(question))
-        self._group = QButtonGroup(self)
-        self._units = list(UNITS.values())
-        guess = likely_unit(size)
-        for index, (unit, factor) in enumerate(UNITS.items()):
-            width, depth, height = (f"{side * factor:.3g}" for side in size)
-            button = QRadioButton(f"{unit.capitalize()}:  {width} × {depth} × {height} m")
-            button.setChecked(factor == guess)
-            self._group.addButton(button, index)
-            column.addWidget(button)
-        column.addWidget(note("Width × depth × height"))
-        kinds = QDialogButtonBox.StandardButton
-        buttons = QDialogButtonBox(kinds.Ok | kinds.Cancel)
-        buttons.button(kinds.Ok).setText("Import")
-        buttons.accepted.connect(self.accept)
-        buttons.rejected.connect(self.reject)
-        column.addWidget(buttons)
-
-    def chosen(self) -> float:
-        """Metres of the chosen unit."""
-        return self._units[self._group.checkedId()]
 
 
 class PluginsDialog(QDialog):
@@ -228,12 +204,3 @@ class KeysDialog(QDialog):
         buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Close)
         buttons.rejected.connect(self.reject)
         column.addWidget(buttons)
-
-
-def likely_unit(size: tuple[float, float, float]) -> float:
-    """Metres of the unit in which the longest side is most like furniture's."""
-    for low, high in _GUESS:
-        for factor in UNITS.values():
-            if low <= max(size) * factor <= high:
-                return factor
-    return 1.0

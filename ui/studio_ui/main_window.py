@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from PySide6.QtCore import Qt, QTimer
-from PySide6.QtGui import QCloseEvent, QDragEnterEvent, QDropEvent
+from PySide6.QtGui import QCloseEvent
 from PySide6.QtWidgets import QMainWindow, QToolBar, QWidget
 
 from studio_core.shading.scheduler import Executor
@@ -20,9 +20,10 @@ from studio_ui.choosing import Choosing
 from studio_ui.commands import Commands
 from studio_ui.context import Context
 from studio_ui.dialogs import Dialogs
-from studio_ui.drops import take_files
 from studio_ui.features import Feature, gather
+from studio_ui.files.drops import Drops
 from studio_ui.files.front import Front
+from studio_ui.files.importing import Importing
 from studio_ui.files.saved_label import SavedLabel
 from studio_ui.files.thumbnails import Thumbnails
 from studio_ui.files.versions import Versions
@@ -63,7 +64,6 @@ class MainWindow(QMainWindow):
         self.context, self.viewport, self.settings = context, viewport, settings
         self.closing = False
         self._in_close = False
-        self.setAcceptDrops(True)
         self.setDockNestingEnabled(True)
         self.status = StatusBar()
         self.setStatusBar(self.status)
@@ -77,9 +77,9 @@ class MainWindow(QMainWindow):
         self.status.addPermanentWidget(self.saved)
         self.following = Following(self, context, viewport, self.status, self.files)
         features = self._features()
-        self.front = Front(
-            context, viewport.widget, self.files, samples or {}, self.transfer.load_environment
-        )
+        load = self.transfer.load_environment
+        self.drops = Drops(self, context, viewport, self.ask, self.files, self.importing, load)
+        self.front = Front(context, viewport.widget, self.files, samples or {}, load, self.drops.overlay)
         self.setCentralWidget(stacked(self.hints, self.front.widget))
         handlers, conditions = gather(features)
         self.actions_ = ActionSet(self, viewport.widget, handlers, conditions, self.following.soon)
@@ -103,7 +103,8 @@ class MainWindow(QMainWindow):
         )
         self.commands = Commands(context, self.tools)
         self.viewing = Viewing(context, self.tools.looking, settings)
-        self.transfer = Transfer(context, self.ask, self.viewing.frame_all, self.files.beside)
+        self.transfer = Transfer(context, self.ask, self.files.beside)
+        self.importing = Importing(context, self.ask, settings, self.viewing.frame_all)
         self.canvas = CanvasChoice(viewport, settings, context.journal.write)
         self.appearance = Appearance(settings, viewport, self.canvas)
         self.layout_ = Layout(self, settings, self._panels())
@@ -116,6 +117,7 @@ class MainWindow(QMainWindow):
             self.files,
             Versions(context, self.ask, self.files),
             self.transfer,
+            self.importing,
             self.commands,
             self.viewing,
             self.appearance,
@@ -162,21 +164,9 @@ class MainWindow(QMainWindow):
     def _opened(self) -> None:
         self.tools.entered = None
 
-    # files dropped, and the end
-
-    def dragEnterEvent(self, event: QDragEnterEvent) -> None:
-        """Files can be dropped anywhere."""
-        if event.mimeData().hasUrls():
-            event.acceptProposedAction()
-
-    def dropEvent(self, event: QDropEvent) -> None:
-        """Projects open, pictures light the scene, anything else is imported."""
-        self.take_files([Path(url.toLocalFile()) for url in event.mimeData().urls() if url.isLocalFile()])
-        event.acceptProposedAction()
-
     def take_files(self, paths: list[Path]) -> None:
         """What dropping does."""
-        take_files(paths, self.files, self.transfer)
+        self.drops.take(paths)
 
     def closeEvent(self, event: QCloseEvent) -> None:
         """Ask about unsaved changes; then let go of everything."""

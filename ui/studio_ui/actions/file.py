@@ -17,6 +17,8 @@ ITEMS: tuple[Item, ...] = (
     SEPARATOR,
     ActionSpec("file.import", "Import model…", "File", "Ctrl+I", "Add furniture from a file", icon="import",
                bar=True),
+    ActionSpec("file.import_options", "Import with options…", "File", "",
+               "Ask about unit, axis and place of every model"),
     ActionSpec("file.environment", "Load environment…", "File", "", "Light from an HDR picture",
                icon="environment"),
     SEPARATOR,

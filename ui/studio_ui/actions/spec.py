@@ -45,6 +45,7 @@ REASONS = {
     "camera": "No camera is chosen",
     "group": "No group is chosen",
     "savable": "Nothing has changed since it was saved",
+    "correctable": "No object is chosen",
     "has_file": "The project is in no file yet",
     "own_file": "The project is in no file that can be changed",
     "picture": "There is no picture yet",

@@ -9,6 +9,7 @@ from PySide6.QtWidgets import QWidget
 
 from studio_ui.canvas.layered import Layered
 from studio_ui.context import Context, Subscriptions
+from studio_ui.files.drop_overlay import DropOverlay
 from studio_ui.files.notice_bar import Notices
 from studio_ui.files.read_only_bar import ReadOnlyBar
 from studio_ui.files.start_page import Begin, StartPage
@@ -26,6 +27,7 @@ class Front:
         files: ProjectFiles,
         samples: Mapping[str, Path],
         load_environment: Callable[[], object],
+        drop_overlay: DropOverlay,
     ) -> None:
         self.widget = Layered(canvas)
         begin = [
@@ -36,7 +38,9 @@ class Front:
         self.start_page = StartPage(context, files.recent, samples, files.open, files.open_copy, begin)
         self.notices = Notices(context.journal)
         self.read_only = ReadOnlyBar(files)
+        self._drop_overlay = drop_overlay
         self.widget.fill(self.start_page)
+        self.widget.fill(drop_overlay)
         self.widget.bar(self.read_only)
         self.widget.bar(self.notices)
         self._subscriptions = Subscriptions()
@@ -45,6 +49,7 @@ class Front:
     def set_theme(self, theme: Theme) -> None:
         """Colours and icons."""
         self.start_page.set_theme(theme)
+        self._drop_overlay.set_theme(theme)
         self.notices.set_theme(theme)
 
     def close(self) -> None:

@@ -1,0 +1,125 @@
+"""What dropping something would do, told before it is let go: a sentence, and whether it can be done."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from PySide6.QtCore import QMimeData
+from PySide6.QtGui import QImageReader
+
+from studio_ui.material_drag import MIME
+from studio_ui.project_files import SUFFIX
+
+HDR = (".exr", ".hdr", ".tif", ".tiff")
+PHOTOGRAPHS = (".png", ".jpg", ".jpeg", ".webp", ".bmp")
+_TWICE = 0.02  # how far from 2:1 the sides of an equirectangular picture may be
+
+
+@dataclass(frozen=True)
+class Intent:
+    """What happens; `problem` says why nothing does. `photograph` is asked about first."""
+
+    project: Path | None = None
+    models: tuple[Path, ...] = ()
+    light: Path | None = None
+    photograph: bool = False
+    material: bool = False
+    problem: str = ""
+
+    def __bool__(self) -> bool:
+        return not self.problem and (
+            self.project is not None or bool(self.models) or self.light is not None or self.material
+        )
+
+    def told(self, *, here: bool, options: bool) -> str:
+        """What will happen; `here` where a model has a place to stand on, `options` while Shift is held."""
+        if self.problem:
+            return self.problem
+        if self.project is not None:
+            return f"Open {self.project.stem}"
+        parts = []
+        if self.models:
+            what = self.models[0].stem if len(self.models) == 1 else f"{len(self.models)} models"
+            parts.append(f"Add {what} {'here' if here else 'to the scene'}{' with options' * options}")
+        if self.light is not None:
+            parts.append(f"{'light' if parts else 'Light'} the room with {self.light.stem}")
+        if self.material:
+            parts.append("Give the object this material")
+        return " and ".join(parts)
+
+
+def dropped_paths(data: QMimeData) -> list[Path] | None:
+    """The files that a drag carries; None when some are not on this computer."""
+    urls = data.urls()
+    if any(not url.isLocalFile() for url in urls):
+        return None
+    return [Path(url.toLocalFile()) for url in urls]
+
+
+def intent(data: QMimeData, known: Collection[str]) -> Intent | None:
+    """What a drag means; None when it is nothing for this program. `known` are endings of models."""
+    if data.hasFormat(MIME):
+        return Intent(material=True)
+    if not data.hasUrls():
+        return None
+    paths = dropped_paths(data)
+    if paths is None:
+        return Intent(problem="Only files on this computer can be dropped: save it there first.")
+    return intent_of(paths, known)
+
+
+def intent_of(paths: Sequence[Path], known: Collection[str]) -> Intent:
+    """What dropping files would do. With `known` empty everything unknown may be a model."""
+    models: list[Path] = []
+    lights: list[Path] = []
+    for path in paths:
+        problem = _unusable(path)
+        if problem:
+            return Intent(problem=problem)
+        ending = path.suffix.lower()
+        if ending == SUFFIX:
+            if len(paths) > 1:
+                return Intent(problem="A project is dropped by itself.")
+            return Intent(project=path)
+        if ending in HDR or ending in PHOTOGRAPHS:
+            lights.append(path)
+        elif not known or ending in known:
+            models.append(path)
+        else:
+            return Intent(problem=f"{path.name} is no model, picture of light or project that can be read.")
+    if len(lights) > 1:
+        return Intent(problem="One picture of light is dropped at a time.")
+    if lights and lights[0].suffix.lower() in PHOTOGRAPHS:
+        problem = _no_environment(lights[0])
+        if problem:
+            return Intent(problem=problem)
+        return Intent(models=tuple(models), light=lights[0], photograph=True)
+    return Intent(models=tuple(models), light=lights[0] if lights else None)
+
+
+def _unusable(path: Path) -> str:
+    try:
+        if path.is_dir():
+            return f"{path.name} is a folder: drop the files in it."
+        if not path.is_file():
+            return f"{path.name} is not there any more."
+    except OSError as error:
+        return f"{path.name} cannot be read: {(error.strerror or 'the disk reports an error').lower()}."
+    if path.suffix.lower() in (".py", ".pyw"):
+        return f"{path.name} is a script: dropping runs nothing. Open it in the console."
+    return ""
+
+
+def _no_environment(path: Path) -> str:
+    """Why a photograph cannot light a room."""
+    size = QImageReader(str(path)).size()
+    if not size.isValid():
+        return f"{path.name} is no picture that can be read."
+    if abs(size.width() - 2 * size.height()) > _TWICE * size.width():
+        return (
+            f"{path.name} is an ordinary photograph of {size.width()} × {size.height()}: "
+            "light needs a picture all around, twice as wide as high."
+        )
+    return ""
