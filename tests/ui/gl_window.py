@@ -180,8 +180,15 @@ def hand(bench: Bench) -> dict[str, Any]:
     turned = bench.grab()
     ahead = canvas.probe(0.5, 0.6)
     canvas.set_guides(view, ())
+    moving = Move({"cube": Transform((-0.9, 0.5, 0.2))})
+    canvas.set_scene(moving(context.document.scene))
+    on_its_way, nowhere = bench.grab(), canvas.probe(0.5, 0.6)
+    canvas.set_scene(context.document.scene)
     return {
         "chosen": chosen,
+        "moved": same(before, on_its_way),
+        "left": nowhere.node if nowhere is not None else None,
+        "back": same(before, bench.grab()),
         "labels": labels,
         "moved_shapes": moved_shapes,
         "same_picture": canvas._picture is picture,

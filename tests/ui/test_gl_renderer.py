@@ -219,6 +219,25 @@ def test_the_ground_has_the_same_lines(screen: Any, painter: Painter) -> None:
     assert (strength[behind] > 0).mean() < 0.05, "the cube hides the ground"
 
 
+def test_objects_are_drawn_where_they_are_by_now(screen: Any, painter: Painter) -> None:
+    """Before there is a picture of it; and they go back when that is undone."""
+    view = sized(VIEW, antialias=1)
+    scene = SCENES["plain"]
+    picture = painter.paint(scene, view)
+    there = Transform((-0.6, 0.8, 0.2), scale=0.6)
+    moved = painter.paint(Move({"cube": there})(scene), view)
+    before = drawn(screen, picture, view)
+    uploads = screen.renderer.tally.uploads
+    pink = {"chosen": frozenset(["cube"]), "accent": (1.0, 0.0, 1.0), "rim": 1}
+    outlined = drawn(screen, picture, view, places={"cube": there}, **pink)
+    wanted = outline(moved.node == moved.nodes.index("cube"))
+    assert np.array_equal((outlined == (255, 0, 255)).all(axis=2), wanted)
+    gone = drawn(screen, picture, view, places={"cube": None})
+    assert not np.array_equal(gone, before)
+    assert screen.renderer.tally.uploads == uploads, "nothing but a matrix"
+    assert np.array_equal(drawn(screen, picture, view), before)
+
+
 def test_what_lies_under_a_point(screen: Any, painter: Painter) -> None:
     view = sized(VIEW, antialias=1)
     picture = painter.paint(SCENES["glass"], view)

@@ -89,6 +89,9 @@ def test_the_hand_on_the_graphics_canvas(play: Play) -> None:
     assert found["same_picture"]
     assert found["turned"] < 0.9, "another view is drawn before there is a picture of it"
     assert found["ahead"] == "cube", "and what lies under the mouse is found in it"
+    assert found["moved"] < 0.97, "what moves is drawn where it is before there is a picture of it"
+    assert found["left"] != "cube"
+    assert found["back"] == 1.0
     assert found["log"] == []
 
 

@@ -64,6 +64,7 @@ class Following:
             viewport.pointer.connect(self._probe),
             viewport.left.connect(lambda: self._status.show_probe(None, context.document.scene)),
         )
+        viewport.set_scene(context.document.scene)
         self._display()
         self._backend()
         self._greet()
@@ -102,6 +103,7 @@ class Following:
         session = self._context.session
         if any(n not in after.nodes for n in session.selection):
             session.select(n for n in session.selection if n in after.nodes)
+        self._viewport.set_scene(after)
         self.soon()
         self._greet()
 

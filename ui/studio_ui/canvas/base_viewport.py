@@ -10,7 +10,7 @@ from PySide6.QtCore import QPointF, QRectF, QSizeF
 from PySide6.QtGui import QImage, QPainter
 from PySide6.QtWidgets import QWidget
 
-from studio_core.scene.nodes import NodeId
+from studio_core.scene.nodes import NodeId, Scene
 from studio_core.scene.transform import vec3
 from studio_core.session import View
 from studio_core.shading.artifacts import Picture
@@ -34,6 +34,7 @@ class BaseViewport(Hand):
         self.freshness = Freshness.NONE
         self._theme = DARK
         self._picture: Picture | None = None
+        self._scene = Scene()
         self._view = NO_VIEW  # of the picture
         self._exposure, self._tonemap = 0.0, "srgb"
         self._selection: frozenset[NodeId] = frozenset()
@@ -50,6 +51,10 @@ class BaseViewport(Hand):
         """Another picture, and the view it was made for."""
         self._picture, self._view = picture, view or NO_VIEW
         self._picture_changed()
+
+    def set_scene(self, scene: Scene) -> None:
+        """What the scene has come to."""
+        self._scene = scene
 
     def set_freshness(self, state: Freshness) -> None:
         """Mark the picture."""

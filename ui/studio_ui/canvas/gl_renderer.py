@@ -9,7 +9,7 @@ its gloo canvas the current one, whenever anything here is called.
 from __future__ import annotations
 
 from collections.abc import Callable, Container
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -25,7 +25,7 @@ from studio_core.shading.primary import LAYERS
 from studio_ui.canvas import gl_shaders as shaders
 from studio_ui.canvas.gl_buffers import Tally
 from studio_ui.canvas.gl_camera import Camera
-from studio_ui.canvas.gl_scene import Batch, Body, GlScene
+from studio_ui.canvas.gl_scene import Batch, Body, GlScene, Places
 from studio_ui.canvas.gl_sky import Sky
 from studio_ui.canvas.gl_sky_shaders import BACKDROP_FRAGMENT
 from studio_ui.canvas.gl_still import Still
@@ -55,6 +55,8 @@ class Look:
     grid: Rgb | None = None
     ground: Rgb = (0.0, 0.0, 0.0)
     """What is shown without a picture."""
+    places: Places = field(default_factory=dict)
+    """Where objects are by now; see `GlScene.place`."""
 
 
 class Picked(NamedTuple):
@@ -105,6 +107,7 @@ class Renderer:
             queue.command("FUNC", "glClearColor", *look.ground, 1.0)
             gloo.clear(color=True, depth=False)
             return
+        self.scene.place(look.places)
         size = (look.view.width * n, look.view.height * n)
         self._targets.resize(size, self.scene.layered)
         camera = Camera.of(look.view, self._near_far(look.view))

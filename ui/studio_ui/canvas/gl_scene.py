@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -71,12 +71,18 @@ class Body:
     plain: Attribute
     slope: Attribute
     sums: tuple[Attribute, ...]
-    transform: Transform = IDENTITY
+    pictured: Transform = IDENTITY
+    transform: Transform = IDENTITY  # where it is drawn
+    shown: bool = True
     batches: tuple[Batch, ...] = ()
 
     def colours(self) -> tuple[Attribute, ...]:
         """What depends on light."""
         return (self.plain, self.slope, *self.sums)
+
+
+Places = Mapping[NodeId, Transform | None]
+"""Where objects are in the world; None: not shown."""
 
 
 class GlScene:
@@ -99,7 +105,7 @@ class GlScene:
     def draws(self, clear: bool) -> Iterator[tuple[int, Body, Batch]]:
         """The batches that are, or are not, looked through, with the number of their object."""
         for index, body in enumerate(self.bodies):
-            for batch in body.batches:
+            for batch in body.batches if body.shown else ():
                 if (batch.opacity < 1) == clear:
                     yield index, body, batch
 
@@ -118,7 +124,9 @@ class GlScene:
             shape = self._shape(placed.mesh, before, wanted)
             batches = self._batches(shape, picture, index)
             body = before or Body(shape, *self._attributes())
-            body.shape, body.transform, body.batches = shape, placed.transform, batches
+            body.shape, body.batches = shape, batches
+            body.pictured = body.transform = placed.transform
+            body.shown = True
             self._colour(body, picture, index)
             bodies.append(body)
         for body in old.values():
@@ -127,6 +135,12 @@ class GlScene:
         for key in [key for key in self._shapes if key not in wanted]:
             self._shapes.pop(key).delete()
         self._picture = picture
+
+    def place(self, places: Places) -> None:
+        """Objects where they are by now; those that are not named stay where the picture has them."""
+        for node, body in zip(self.nodes, self.bodies, strict=True):
+            place = places.get(node, body.pictured)
+            body.shown, body.transform = place is not None, place or body.pictured
 
     def clear(self) -> None:
         """Give everything back."""

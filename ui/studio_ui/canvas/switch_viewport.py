@@ -10,7 +10,7 @@ import numpy.typing as npt
 from PySide6.QtGui import QImage
 from PySide6.QtWidgets import QVBoxLayout, QWidget
 
-from studio_core.scene.nodes import NodeId
+from studio_core.scene.nodes import NodeId, Scene
 from studio_core.session import View
 from studio_core.shading.artifacts import Picture
 from studio_core.signal import Signal
@@ -82,6 +82,10 @@ class SwitchViewport(QWidget):
     def set_picture(self, picture: Picture | None, view: View | None) -> None:
         """Another picture, and the view it was made for."""
         self._tell("set_picture", picture, view)
+
+    def set_scene(self, scene: Scene) -> None:
+        """What the scene has come to."""
+        self._tell("set_scene", scene)
 
     def set_freshness(self, state: Freshness) -> None:
         """Mark the picture."""

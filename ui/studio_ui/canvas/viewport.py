@@ -11,7 +11,7 @@ import numpy.typing as npt
 from PySide6.QtGui import QImage
 from PySide6.QtWidgets import QWidget
 
-from studio_core.scene.nodes import NodeId
+from studio_core.scene.nodes import NodeId, Scene
 from studio_core.scene.transform import Vec3
 from studio_core.session import View
 from studio_core.shading.artifacts import Picture
@@ -74,6 +74,10 @@ class Viewport(Protocol):
 
     def set_picture(self, picture: Picture | None, view: View | None) -> None:
         """Another picture, and the view it was made for."""
+        ...
+
+    def set_scene(self, scene: Scene) -> None:
+        """What the scene has come to: a canvas that can shows things where they are, before their picture."""
         ...
 
     def set_freshness(self, state: Freshness) -> None:

@@ -13,6 +13,7 @@ from PySide6.QtCore import QRectF, Qt
 from PySide6.QtGui import QColor, QImage, QPainter, QPaintEvent, QResizeEvent
 from PySide6.QtWidgets import QWidget
 
+from studio_core.scene.nodes import Scene
 from studio_core.scene.transform import vec3
 from studio_core.session import View
 from studio_core.shading.artifacts import Picture
@@ -20,6 +21,7 @@ from studio_ui.canvas.base_viewport import BaseViewport
 from studio_ui.canvas.gl_buffers import Tally
 from studio_ui.canvas.gl_renderer import Look
 from studio_ui.canvas.gl_report import SOFTWARE
+from studio_ui.canvas.gl_scene import Places
 from studio_ui.canvas.gl_surface import GlSurface
 from studio_ui.canvas.glyphs import Glyph
 from studio_ui.canvas.overlay import NOTHING, Overlay
@@ -52,6 +54,7 @@ class VispyViewport(BaseViewport):
 
     def __init__(self, failed: Callable[[str], None], parent: QWidget | None = None) -> None:
         super().__init__(parent)
+        self._places: Places = {}
         self.surface = GlSurface(self._content, failed, self)
         self.surface.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
         self._marks = _Marks(self._paint_marks, self)
@@ -74,7 +77,7 @@ class VispyViewport(BaseViewport):
     def probe(self, x: float, y: float) -> Probe | None:
         """What lies under a point: from the picture, or from the GPU while it shows another view."""
         picture = self._picture
-        if picture is None or self._same_view():
+        if picture is None or self._as_pictured():
             return super().probe(x, y)
         if picture.colours is None:
             return None
@@ -98,6 +101,11 @@ class VispyViewport(BaseViewport):
         painter.end()
         return image
 
+    def set_scene(self, scene: Scene) -> None:
+        """What the scene has come to: things are drawn where they are at once."""
+        super().set_scene(scene)
+        self._follow_scene()
+
     def set_freshness(self, state: Freshness) -> None:
         """Mark the picture; at rest it is drawn with more samples."""
         still = self.freshness in _STILL
@@ -111,9 +119,24 @@ class VispyViewport(BaseViewport):
         self._marks.setGeometry(self.rect())
         super().resizeEvent(event)
 
-    def _same_view(self) -> bool:
+    def _as_pictured(self) -> bool:
+        """Whether eye and objects are where the picture has them."""
         now, then = self.view, self._view
-        return (now.transform, now.fov) == (then.transform, then.fov)
+        return not self._places and (now.transform, now.fov) == (then.transform, then.fov)
+
+    def _follow_scene(self) -> None:
+        """Where objects of the picture are by now, as far as they are somewhere else."""
+        picture, scene, places = self._picture, self._scene, {}
+        for placed in (
+            picture.radiance.surfaces.mesh.objects if picture is not None and picture.colours else ()
+        ):
+            there = placed.node in scene.nodes and scene.shown(placed.node)
+            place = scene.world(placed.node) if there else None
+            if place != placed.transform:
+                places[placed.node] = place
+        if places != self._places:
+            self._places = places
+            self.surface.update()
 
     def _slow(self) -> bool:
         """Whether no graphics card draws."""
@@ -136,10 +159,12 @@ class VispyViewport(BaseViewport):
             (accent.redF(), accent.greenF(), accent.blueF()),
             GRID if self._grid else None,
             (ground.redF(), ground.greenF(), ground.blueF()),
+            self._places,
         )
         return self._picture, look
 
     def _picture_changed(self) -> None:
+        self._follow_scene()
         self.surface.update()
         self._marks.update()
 
