@@ -471,12 +471,12 @@ def test_a_very_large_picture_is_shown_more_coarsely(screen: Any, painter: Paint
 def test_environments_too_large_for_the_driver(screen: Any, painter: Painter) -> None:
     scene = SetFields("sky", {"image": sky(256)})(little_scene())
     picture = painter.paint(scene, VIEW)
-    renderer = screen.renderer
-    kept, renderer._largest = renderer._largest, 100
+    there = screen.renderer._sky
+    kept, there._largest = there._largest, 100
     try:
         made = drawn(screen, picture, VIEW)
     finally:
-        renderer._largest = kept
+        there._largest = kept
     assert agreement(made, tonemap(picture.linear), edges(picture)) >= 0.99
 
 
