@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-import numpy as np
 import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QColor
 from ui_support import Driver
 
-from studio_core.edits import Add, AddMaterial
+from studio_core.edits import AddMaterial
 from studio_core.params import param_infos
-from studio_core.scene.geometry import Image
-from studio_core.scene.nodes import Environment, Material, SpotLamp
+from studio_core.scene.nodes import Material
 from studio_ui.colour_button import to_display, to_linear
-from studio_ui.panels.lighting import LAMPS
 from studio_ui.panels.outliner_model import EYE, NAME
 
 
@@ -136,32 +133,6 @@ def test_showing_values_is_no_edit(driver: Driver) -> None:
     driver.bot.keyClick(spin, Qt.Key.Key_Return)
     assert values(driver, "odd")["roughness"] == 0.123456789
     assert driver.labels()[1:] == ["New material"]
-
-
-def test_the_environment_is_turned_by_its_form(driver: Driver) -> None:
-    image = Image(np.ones((8, 16, 3), np.float32))
-    driver.document.apply(Add((Environment(id="sky", name="Sky", image=image),)))
-    panel = driver.window.panels["lighting"]
-    driver.until(lambda: panel.light == "sky")
-    for name, value in (("azimuth", 45.0), ("tilt", 10.0), ("temperature", 3000.0)):
-        panel.form.fields[name].spin.setValue(value)
-        assert getattr(driver.document.scene["sky"], name) == value
-    panel._on.setChecked(False)
-    assert driver.document.scene["sky"].hidden
-    assert panel.preview.pixmap().width() > 0
-
-
-def test_lamps_are_added_above_the_scene(driver: Driver) -> None:
-    panel = driver.window.panels["lighting"]
-    panel.add_lamp("Spot lamp", LAMPS["Spot lamp"])
-    (lamp,) = driver.session.selection
-    node = driver.document.scene[lamp]
-    assert isinstance(node, SpotLamp)
-    assert driver.document.scene.world(lamp).matrix()[:3, :3] @ (0, 0, -1) == pytest.approx(
-        (0, -1, 0), abs=1e-6
-    )
-    assert node.transform.translation[1] > 1.0
-    assert driver.labels()[1:] == ["Add spot lamp"]
 
 
 def test_the_outliner_renames_hides_and_finds(driver: Driver) -> None:

@@ -86,6 +86,7 @@ class NumberField(Field):
         if high > low:
             self.slider = self.make_slider()
             self.slider.setRange(0, _STEPS)
+            self.slider.setMinimumWidth(30)
             self.slider.setFocusPolicy(Qt.FocusPolicy.NoFocus)
             self.slider.setAccessibleName(info.label)
             self.slider.sliderPressed.connect(self._pressed)

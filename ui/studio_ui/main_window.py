@@ -20,6 +20,7 @@ from studio_ui.choosing import Choosing
 from studio_ui.commands import Commands
 from studio_ui.context import Context
 from studio_ui.dialogs import Dialogs
+from studio_ui.environment_shelf import EnvironmentShelf
 from studio_ui.features import Feature, gather
 from studio_ui.files.drops import Drops
 from studio_ui.files.front import Front
@@ -62,6 +63,7 @@ class MainWindow(QMainWindow):
     ) -> None:
         super().__init__()
         self.context, self.viewport, self.settings = context, viewport, settings
+        self._samples = samples or {}
         self.closing = False
         self._in_close = False
         self.setDockNestingEnabled(True)
@@ -79,14 +81,14 @@ class MainWindow(QMainWindow):
         features = self._features()
         load = self.transfer.load_environment
         self.drops = Drops(self, context, viewport, self.ask, self.files, self.importing, load)
-        self.front = Front(context, viewport.widget, self.files, samples or {}, load, self.drops.overlay)
+        self.front = Front(context, viewport.widget, self.files, self._samples, load, self.drops.overlay)
         self.setCentralWidget(stacked(self.hints, self.front.widget))
         handlers, conditions = gather(features)
         self.actions_ = ActionSet(self, viewport.widget, handlers, conditions, self.following.soon)
         for panel in self.panels.values():
             panel.use_actions(self.actions_.actions)
         self.menus = Menus(self.menuBar(), self.actions_, context, self.commands, self.files)
-        self.menus.offer_samples(samples or {})
+        self.menus.offer_samples(self._samples)
         self.menus.offer_panels(self.docks)
         self._make_bar()
         wearers = [self.front.set_theme, *(panel.set_theme for panel in self.panels.values())]
@@ -130,7 +132,9 @@ class MainWindow(QMainWindow):
 
     def _panels(self) -> list[tuple[Panel, Qt.DockWidgetArea]]:
         load, save = self.transfer.load_environment, self.files.save
-        return all_panels(self.context, load, self.ask, self.settings, save)
+        shelf = EnvironmentShelf(self.context, self.settings, self._samples, load)
+        self.transfer.lit.connect(shelf.used)
+        return all_panels(self.context, shelf, load, self.ask, self.settings, save)
 
     def handlers(self) -> dict[str, Callable[[], object]]:
         """By action id."""

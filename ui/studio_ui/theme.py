@@ -110,6 +110,9 @@ QCheckBox::indicator { width: 14px; height: 14px; border: 1px solid $dim; border
     background: $base; }
 QCheckBox::indicator:checked { background: $accent; border-color: $accent; }
 QCheckBox::indicator:indeterminate { background: $dim; }
+QTreeView::indicator { width: 12px; height: 12px; border: 1px solid $dim; border-radius: 3px;
+    background: $base; }
+QTreeView::indicator:checked { background: $accent; border-color: $text; }
 QComboBox QAbstractItemView { background: $raised; border: 1px solid $border; outline: 0; }
 QPushButton { background: $raised; border: 1px solid $border; border-radius: 4px; padding: 5px 12px; }
 QPushButton:hover { border-color: $accent; }

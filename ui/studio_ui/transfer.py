@@ -11,9 +11,10 @@ from studio_core.errors import PluginError
 from studio_core.kernels.tonemap import tonemap
 from studio_core.scene.geometry import Image
 from studio_core.shading.job import Job
+from studio_core.signal import Signal
 from studio_ui.ask import Ask, Filter
 from studio_ui.context import Context
-from studio_ui.panels.lighting import set_environment
+from studio_ui.environment_shelf import set_environment
 
 ENVIRONMENTS = Filter("Pictures of light", (".exr", ".hdr", ".tif", ".tiff", ".png", ".jpg", ".jpeg"))
 PNG, EXR = Filter("PNG picture, as shown", (".png",)), Filter("OpenEXR, scene-linear", (".exr",))
@@ -29,6 +30,7 @@ class Transfer:
         beside: Callable[[str], Path],
     ) -> None:
         """`beside` tells where a file of a suffix is suggested to be written."""
+        self.lit: Signal[[Path]] = Signal()  # an environment was loaded
         self._context, self._ask, self._beside = context, ask, beside
 
     def handlers(self) -> dict[str, Callable[[], object]]:
@@ -63,7 +65,8 @@ class Transfer:
         def done(found: tuple[Image, tuple[str, ...]]) -> None:
             image, notes = found
             self._tell(path, notes)
-            self._context.editing.apply(set_environment(self._context.document.scene, image, path))
+            self._context.editing.apply(set_environment(self._context.document.scene, image, path.stem))
+            self.lit.emit(path)
 
         self._context.tasks.run(f"Reading {path.name}", read, done)
 

@@ -8,6 +8,7 @@ from PySide6.QtCore import Qt
 
 from studio_ui.ask import Ask
 from studio_ui.context import Context
+from studio_ui.environment_shelf import EnvironmentShelf
 from studio_ui.panels.console import ConsolePanel
 from studio_ui.panels.history import HistoryPanel
 from studio_ui.panels.jobs import JobsPanel
@@ -23,6 +24,7 @@ from studio_ui.settings import Settings
 
 def all_panels(
     context: Context,
+    shelf: EnvironmentShelf,
     load_environment: Callable[[], object],
     ask: Ask,
     settings: Settings,
@@ -38,7 +40,7 @@ def all_panels(
         (LogPanel(context), left),
         (PropertiesPanel(context), right),
         (MaterialsPanel(context), right),
-        (LightingPanel(context, load_environment), right),
+        (LightingPanel(context, shelf, load_environment, ask.folder), right),
         (ShadingPanel(context), right),
         (ConsolePanel(context, ask, settings, save), below),
     ]

@@ -66,6 +66,13 @@ class Panel(QWidget):
         self.column.addWidget(area, 1)
         return column
 
+    def inside(self, column: QVBoxLayout) -> QVBoxLayout:
+        """A column in a column, that can be cleared by itself."""
+        made = QVBoxLayout()
+        made.setSpacing(GAP)
+        column.addLayout(made)
+        return made
+
 
 def row(*widgets: QWidget, stretch: int = -1) -> QHBoxLayout:
     """Widgets side by side; the one at index `stretch` takes the room."""

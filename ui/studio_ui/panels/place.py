@@ -11,7 +11,7 @@ from PySide6.QtWidgets import QHBoxLayout, QLabel, QWidget
 
 from studio_core.edits import Move
 from studio_core.params import ParamInfo
-from studio_core.scene.nodes import NodeId, Scene
+from studio_core.scene.nodes import Camera, Light, NodeId, Scene
 from studio_core.scene.size import own_size, resized
 from studio_core.scene.transform import IDENTITY, Transform, Vec3
 from studio_ui.canvas.drags import named
@@ -42,6 +42,7 @@ _AXES = ("x", "y", "z")
 _SIDES = ("width", "depth", "height")
 _ROUNDED = 1e-7  # what Euler angles lose on the way there and back is no edit
 Moved = Callable[[Transform, NodeId, int, float], Transform]
+_SCALE_ROW, _SIZE_ROW = 2, 3
 _MOST = 20  # things that are measured; of more, the last ones
 
 
@@ -50,7 +51,8 @@ class Triple(QWidget):
 
     def __init__(self, info: ParamInfo, edits: Edits, names: Sequence[str] = _AXES) -> None:
         super().__init__()
-        self.spins = [Spin(info, show_unit=False) for _ in names]
+        decimals = 2 if info.unit == "°" else 3
+        self.spins = [Spin(info, decimals=decimals, show_unit=False) for _ in names]
         self._values: list[float] = [math.inf] * len(names)
         self._edits = edits
         layout = QHBoxLayout(self)
@@ -148,11 +150,11 @@ class PlaceEditor(QWidget):
         self.resets: Mapping[str, ResetButton] = resets
         layout = form_layout(self)
         rows = ((_POSITION, self.position), (_ANGLE, self.rotation), (_SCALE, self.scale))
+        self._layout = layout
         for (info, triple), reset in zip(rows, resets.values(), strict=True):
             layout.addRow(UnitLabel(info, info.doc), beside(triple, reset))
-        self._size_label = UnitLabel(_SIZE, f"Width × depth × height\n{_SIZE.doc}")
-        self._size_row = beside(self.size, ResetButton("size", lambda: None))
-        layout.addRow(self._size_label, self._size_row)
+        tip = f"Width × depth × height\n{_SIZE.doc}"
+        layout.addRow(UnitLabel(_SIZE, tip), beside(self.size, ResetButton("size", lambda: None)))
 
     def show_nodes(self, scene: Scene, nodes: tuple[NodeId, ...]) -> None:
         """Those things as they are now."""
@@ -165,8 +167,9 @@ class PlaceEditor(QWidget):
         sizes = [size for size in (own_size(scene, node) for node in nodes) if size is not None]
         if sizes:
             self._show(self.size, sizes)
-        for widget in (self._size_label, self._size_row):
-            widget.setVisible(bool(sizes))
+        grows = not all(isinstance(scene[node], Camera | Light) for node in nodes)
+        self._layout.setRowVisible(_SCALE_ROW, grows)
+        self._layout.setRowVisible(_SIZE_ROW, bool(sizes))
         for name, button in self.resets.items():
             button.offer(any(getattr(place, name) != getattr(IDENTITY, name) for place in places))
 

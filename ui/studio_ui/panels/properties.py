@@ -5,18 +5,18 @@ from __future__ import annotations
 from PySide6.QtCore import QSignalBlocker, QTimer
 from PySide6.QtWidgets import QWidget
 
-from studio_core.edits import Assign, Compound, Edit, SetFields
-from studio_core.params import ParamInfo, Value, param_infos
+from studio_core.edits import Assign, Compound
+from studio_core.params import ParamInfo, param_infos
 from studio_core.scene.diff import Changes
 from studio_core.scene.nodes import Environment, MaterialId, MeshObject, Node, NodeId, Scene
 from studio_ui.context import Context
 from studio_ui.fields import Combo
+from studio_ui.node_sink import NodeSink
 from studio_ui.panels.light_form import NodeForm, shared_values
 from studio_ui.panels.node_kinds import kinds_name
 from studio_ui.panels.panel import Panel, clear, heading, note
 from studio_ui.panels.place import PlaceEditor
 from studio_ui.param_form import ParamForm, form_label, form_layout
-from studio_ui.sinks import EditSink
 from studio_ui.spin import MIXED
 
 _FLAGS = ("hidden", "locked")
@@ -32,7 +32,7 @@ class PropertiesPanel(Panel):
     def __init__(self, context: Context) -> None:
         super().__init__(context)
         self.nodes: tuple[NodeId, ...] = ()
-        self._sink = EditSink(context.editing, self._make, self._label)
+        self._sink = NodeSink(context, lambda: self.nodes)
         self.form: NodeForm | None = None
         self.flags: ParamForm | None = None
         self.place: PlaceEditor | None = None
@@ -81,7 +81,7 @@ class PropertiesPanel(Panel):
         self._column.addWidget(heading(kinds_name(nodes)))
         if len(nodes) > 1:
             self._column.addWidget(note(f"What is typed counts for all of them; {MIXED} where they differ."))
-        infos = _shared_infos(nodes)
+        infos = shared_infos(nodes)
         self.form = NodeForm(type(nodes[-1]), infos, self._sink)
         self._column.addWidget(self.form)
         if not any(isinstance(node, Environment) for node in nodes):
@@ -134,23 +134,6 @@ class PropertiesPanel(Panel):
 
     # edits
 
-    def _label(self, name: str) -> str:
-        scene = self.context.document.scene
-        nodes = [scene[n] for n in self.nodes if n in scene.nodes]
-        info: ParamInfo = param_infos(type(nodes[-1]))[name]
-        what = nodes[0].name if len(nodes) == 1 else kinds_name(nodes)
-        return f"{info.label} of {what}"
-
-    def _make(self, name: str, value: Value) -> Edit:
-        nodes = [n for n in self.nodes if n in self.context.document.scene.nodes]
-        if len(nodes) == 1:
-            return SetFields(nodes[0], {name: value}, self._label(name))
-        if name == "name":
-            edits = [SetFields(n, {name: f"{value} {i}"}) for i, n in enumerate(nodes, 1)]
-        else:
-            edits = [SetFields(n, {name: value}) for n in nodes]
-        return Compound(self._label(name), tuple(edits))
-
     def _assign(self, slot: int) -> None:
         scene = self.context.document.scene
         material = self.slots[slot].currentData()
@@ -161,7 +144,7 @@ class PropertiesPanel(Panel):
         self.context.editing.apply(Compound(f"{scene.material(material).name} on {what}", edits))
 
 
-def _shared_infos(nodes: list[Node]) -> dict[str, ParamInfo]:
+def shared_infos(nodes: list[Node]) -> dict[str, ParamInfo]:
     """The parameters that all of them have, as the last one has them."""
     kinds = [param_infos(kind) for kind in {type(node) for node in nodes}]
     return {

@@ -1,0 +1,116 @@
+"""The shelf of environments as a list of thumbnails; the one that lights the scene is marked."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import QPoint, QSignalBlocker, QSize, Qt
+from PySide6.QtGui import QColor, QIcon, QPainter, QPen, QPixmap
+from PySide6.QtWidgets import QListView, QListWidget, QListWidgetItem, QMenu
+
+from studio_ui.environment_shelf import Entry, EnvironmentShelf
+from studio_ui.theme import DARK, Theme
+
+_ICON = QSize(108, 54)
+_GRID = QSize(118, 80)
+_ROLE = Qt.ItemDataRole.UserRole
+
+
+class ShelfList(QListWidget):
+    """A click, or Enter, lights the scene with an environment."""
+
+    def __init__(self, shelf: EnvironmentShelf) -> None:
+        super().__init__()
+        self._shelf = shelf
+        self._theme = DARK
+        self._shown: tuple[tuple[Entry, str, bool], ...] = ()
+        self.setAccessibleName("Environments")
+        self.setViewMode(QListView.ViewMode.IconMode)
+        self.setResizeMode(QListView.ResizeMode.Adjust)
+        self.setMovement(QListView.Movement.Static)
+        self.setUniformItemSizes(True)
+        self.setWordWrap(False)
+        self.setIconSize(_ICON)
+        self.setGridSize(_GRID)
+        self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        self.setFixedHeight(2 * _GRID.height() + 8)
+        self.setContextMenuPolicy(Qt.ContextMenuPolicy.CustomContextMenu)
+        self.customContextMenuRequested.connect(self._menu)
+        self.itemClicked.connect(self._light)
+        self.itemActivated.connect(self._light)
+
+    def set_theme(self, theme: Theme) -> None:
+        """Another colour of the mark."""
+        self._theme, self._shown = theme, ()
+        self.refresh()
+
+    def refresh(self) -> None:
+        """What the shelf has now."""
+        shelf = self._shelf
+        shown = tuple(
+            (
+                entry,
+                shelf.thumbnails[entry.id].key if entry.id in shelf.thumbnails else "",
+                shelf.is_current(entry),
+            )
+            for entry in shelf.entries
+        )
+        if shown == self._shown:
+            return
+        self._shown = shown
+        at = self.currentRow()
+        with QSignalBlocker(self):
+            self.clear()
+            for entry, _, current in shown:
+                item = QListWidgetItem(self._icon(entry, current), entry.name)
+                item.setData(_ROLE, entry)
+                item.setToolTip(self._tip(entry, current))
+                item.setTextAlignment(Qt.AlignmentFlag.AlignHCenter)
+                if current:
+                    font = item.font()
+                    font.setBold(True)
+                    item.setFont(font)
+                self.addItem(item)
+            if at >= 0:
+                self.setCurrentRow(min(at, self.count() - 1))
+
+    def _tip(self, entry: Entry, current: bool) -> str:
+        thumbnail = self._shelf.thumbnails.get(entry.id)
+        lines = [entry.name, thumbnail.size if thumbnail is not None else "Reading…"]
+        if entry.path is not None:
+            lines.append(str(entry.path))
+        return "\n".join([*lines, "It lights the scene" if current else "Click to light the scene with it"])
+
+    def _icon(self, entry: Entry, current: bool) -> QIcon:
+        ratio = self.devicePixelRatioF()
+        pixmap = QPixmap(_ICON * ratio)
+        pixmap.fill(Qt.GlobalColor.transparent)
+        painter = QPainter(pixmap)
+        thumbnail = self._shelf.thumbnails.get(entry.id)
+        if thumbnail is not None:
+            painter.setRenderHint(QPainter.RenderHint.SmoothPixmapTransform)
+            painter.drawImage(pixmap.rect(), thumbnail.image)
+        else:
+            painter.fillRect(pixmap.rect(), QColor(self._theme.raised))
+        if current:
+            painter.setPen(QPen(QColor(self._theme.accent), 4 * ratio))
+            painter.drawRect(pixmap.rect())
+        painter.end()
+        pixmap.setDevicePixelRatio(ratio)
+        made = QIcon(pixmap)
+        made.addPixmap(pixmap, QIcon.Mode.Selected)  # not tinted
+        return made
+
+    def _light(self, item: QListWidgetItem) -> None:
+        entry = item.data(_ROLE)
+        if not self._shelf.is_current(entry):
+            self._shelf.light(entry)
+
+    def _menu(self, place: QPoint) -> None:
+        item = self.itemAt(place)
+        entry = item.data(_ROLE) if item is not None else None
+        if entry is None or entry.path is None or entry.sample:
+            return
+        menu = QMenu(self)
+        menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        menu.addAction("Light the scene with it", lambda: self._shelf.light(entry))
+        menu.addAction("Take off the list", lambda: self._shelf.forget(entry))
+        menu.popup(self.viewport().mapToGlobal(place))
