@@ -7,22 +7,19 @@ from functools import partial
 
 import numpy as np
 
-from studio_core.edits import Add, Compound, Edit, Move, Remove, Reparent, SetFields, duplicate
+from studio_core.edits import Add, Compound, Edit, Move, Remove, Reparent, SetFields
 from studio_core.photographs import stand_in_photograph
 from studio_core.scene.arranging import is_locked, roots, shifted, turned
 from studio_core.scene.nodes import Camera, Environment, Group, NodeId, Scene, new_id
-from studio_core.scene.standing import dropped
-from studio_core.scene.transform import Transform, vec3
+from studio_core.scene.transform import Transform
 from studio_core.session import View
 from studio_ui.canvas import navigation
 from studio_ui.canvas.drags import middle, named
-from studio_ui.canvas.projection import bounds
 from studio_ui.canvas.tools import TOOLS, CanvasTools
 from studio_ui.context import Context
 
 STEP = 0.05  # metres
 ANGLE = 15.0  # degrees
-_COPY_OFFSET = 0.3
 
 
 class Commands:
@@ -36,11 +33,10 @@ class Commands:
         made: dict[str, Callable[[], object]] = {
             "edit.undo": self._context.editing.undo,
             "edit.redo": self._context.editing.redo,
-            "edit.duplicate": self.duplicate,
             "edit.delete": self.delete,
             "edit.select_all": self.select_all,
+            "edit.select_box": self._tools.band,
             "edit.select_none": lambda: self._context.session.select([]),
-            "object.drop": self.drop,
             "object.photograph": self.stand_in_photograph,
             "object.group": self.group,
             "object.ungroup": self.ungroup,
@@ -86,20 +82,6 @@ class Commands:
 
     # scene
 
-    def duplicate(self) -> None:
-        """Copies beside the originals, chosen."""
-        scene = self._context.document.scene
-        nodes = tuple(n for n in self.chosen if not isinstance(scene[n], Environment))
-        if not nodes:
-            return
-        right, _ = navigation.nudge_axes(self._context.session.view)
-        found = bounds(scene, nodes)
-        wide = float(np.abs((found[1] - found[0]) @ np.abs(right))) if found is not None else 0.0
-        edit = duplicate(scene, nodes, offset=Transform(vec3(right * (wide + _COPY_OFFSET))))
-        fresh = {node.id for node in edit.nodes}
-        if self._apply(edit):
-            self._context.session.select(n.id for n in edit.nodes if n.parent not in fresh)
-
     def delete(self) -> None:
         """What is chosen, with what hangs under it; locked things stay."""
         scene = self._context.document.scene
@@ -122,10 +104,6 @@ class Commands:
     def turn(self, degrees: float) -> None:
         """About the vertical through the middle."""
         self._move(lambda scene, nodes: turned(scene, nodes, degrees, middle(scene, nodes)), "Turn")
-
-    def drop(self) -> None:
-        """Stand on the floor."""
-        self._move(dropped, "Drop")
 
     def stand_in_photograph(self) -> None:
         """Shadows on the floor of the photographed room, which is seen under the furniture."""

@@ -60,6 +60,11 @@ class Editing:
         if self._gesture is not None and self._owner is owner:
             self._gesture.label = label
 
+    def rename(self, owner: object, label: str) -> None:
+        """What the history will call the gesture."""
+        if self._gesture is not None and self._owner is owner:
+            self._gesture.label = label
+
     def commit(self, owner: object) -> None:
         """End the gesture as one step."""
         if self._gesture is not None and self._owner is owner:

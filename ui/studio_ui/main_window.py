@@ -12,6 +12,7 @@ from PySide6.QtWidgets import QMainWindow, QToolBar, QWidget
 from studio_core.shading.scheduler import Executor
 from studio_ui.actions.action_set import ActionSet
 from studio_ui.appearance import Appearance
+from studio_ui.arranging import Arranging
 from studio_ui.ask import Ask
 from studio_ui.canvas.choice import CanvasChoice
 from studio_ui.canvas.switch_viewport import SwitchViewport
@@ -32,6 +33,7 @@ from studio_ui.following import Following
 from studio_ui.help import Help
 from studio_ui.hint_bar import HintBar
 from studio_ui.layout import Layout
+from studio_ui.magnet import Magnet
 from studio_ui.menus import Menus
 from studio_ui.palette import Palette, menu_entries
 from studio_ui.panels.all import all_panels
@@ -100,9 +102,17 @@ class MainWindow(QMainWindow):
     def _features(self) -> list[Feature]:
         """What brings handlers of actions."""
         context, viewport, settings = self.context, self.viewport, self.settings
+        self.magnet = Magnet(settings)
         self.tools = CanvasTools(
-            viewport, context.document, context.session, context.editing, context.feed, self.status.say
+            viewport,
+            context.document,
+            context.session,
+            context.editing,
+            context.feed,
+            self.magnet,
+            self.status.say,
         )
+        self.arranging = Arranging(context)
         self.commands = Commands(context, self.tools)
         self.viewing = Viewing(context, self.tools.looking, settings)
         self.transfer = Transfer(context, self.ask, self.files.beside)
@@ -122,6 +132,8 @@ class MainWindow(QMainWindow):
             self.importing,
             self.commands,
             self.viewing,
+            self.arranging,
+            self.magnet,
             self.appearance,
             self.layout_,
             self.palette_,

@@ -43,6 +43,7 @@ class StatusBar(QStatusBar):
         self.setSizeGripEnabled(False)
         self.message = QLabel()
         self.message.setTextFormat(self.message.textFormat().PlainText)
+        self.message.setMinimumWidth(1)  # a long one widens no window
         self.pixel = QLabel()
         self.backend = QLabel()
         self.vertices = QLabel()

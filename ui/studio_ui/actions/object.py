@@ -9,20 +9,60 @@ def _nudge(name: str, text: str, shortcut: str) -> ActionSpec:
     )
 
 
+def _align(name: str, text: str) -> ActionSpec:
+    return ActionSpec(
+        f"object.align_{name}", text, "Object/Align", "", "Of what is chosen, as you see it", enabled="two"
+    )
+
+
+def _spread(name: str, text: str) -> ActionSpec:
+    return ActionSpec(
+        f"object.spread_{name}", text, "Object/Distribute", "", "Equal gaps; both ends stay", enabled="three"
+    )
+
+
 ITEMS: tuple[Item, ...] = (
-    ActionSpec("tool.select", "Select", "Object", "Q", "Choose only; a drag looks around", icon="select",
-               bar=True, group="tool", checked="tool_select", canvas=True),
+    ActionSpec("tool.select", "Select", "Object", "Q", "Choose only; a drag draws a box",
+               icon="select", bar=True, group="tool", checked="tool_select", canvas=True),
     ActionSpec("tool.move", "Move", "Object", "W",
-               "Drag what is chosen over the floor; Shift up and down; Ctrl in steps of 5 cm", icon="move",
+               "Drag an arrow, a square, or the thing itself; X, Y, Z and a typed distance", icon="move",
                bar=True, group="tool", checked="tool_move", canvas=True),
-    ActionSpec("tool.rotate", "Rotate", "Object", "Shift+R",
-               "Drag what is chosen to turn it; Ctrl in steps of 15°", icon="rotate",
+    ActionSpec("tool.rotate", "Rotate", "Object", "E",
+               "Drag a ring, or the thing itself; X, Y, Z and a typed angle", icon="rotate",
                bar=True, group="tool", checked="tool_rotate", canvas=True),
+    ActionSpec("tool.scale", "Scale", "Object", "R",
+               "Drag a handle: all sides grow alike; or type a factor, such as 120 %", icon="scale",
+               bar=True, group="tool", checked="tool_scale", canvas=True),
+    ActionSpec("tool.local_axes", "Use its own axes", "Object", "L",
+               "Arrows and rings turn with what is chosen, instead of standing as the room does",
+               checked="local_axes", canvas=True),
+    ActionSpec("snap.on", "Snap", "Object/Snap", "M",
+               "Things you drag are drawn to places that fit; hold Ctrl for the opposite",
+               icon="magnet", bar=True, checked="snap_on", canvas=True),
+    ActionSpec("snap.grid", "To steps", "Object/Snap", "", "Multiples of 5 cm, 15° and 5 %",
+               checked="snap_grid"),
+    ActionSpec("snap.objects", "To other things", "Object/Snap", "", "Sides and middles of what is near",
+               checked="snap_objects"),
+    ActionSpec("snap.surfaces", "To surfaces", "Object/Snap", "",
+               "What stands is set down on the table, rug or floor that you point at",
+               checked="snap_surfaces"),
     SEPARATOR,
     ActionSpec("object.photograph", "Stand in the photograph", "Object", "",
                "A floor for shadows on the photographed room, whose picture is seen on the ground"),
-    ActionSpec("object.drop", "Drop to floor", "Object", "End", "Let what is chosen stand on the floor",
+    ActionSpec("object.drop", "Drop", "Object", "End", "Down onto what lies below it, or the floor",
                icon="drop", bar=True, enabled="movable"),
+    _align("left", "Left sides"),
+    _align("centre", "Middles, left to right"),
+    _align("right", "Right sides"),
+    _align("front", "Front sides"),
+    _align("depth", "Middles, front to back"),
+    _align("back", "Back sides"),
+    _align("bottom", "Undersides"),
+    _align("height", "Middles, floor to ceiling"),
+    _align("top", "Tops"),
+    _spread("across", "Left to right"),
+    _spread("away", "Front to back"),
+    _spread("up", "Floor to ceiling"),
     _nudge("left", "Nudge left", "Left"),
     _nudge("right", "Nudge right", "Right"),
     _nudge("away", "Nudge away", "Up"),
@@ -38,6 +78,8 @@ ITEMS: tuple[Item, ...] = (
     ActionSpec("object.group", "Group", "Object", "Ctrl+G", "Hold what is chosen together",
                enabled="selection"),
     ActionSpec("object.ungroup", "Ungroup", "Object", "Ctrl+Shift+G", enabled="group"),
+    ActionSpec("object.own_material", "Make material its own", "Object", "",
+               "Copies of the materials that other things use too", enabled="mesh"),
     ActionSpec("object.hide", "Hide", "Object", "H", enabled="selection", canvas=True),
     ActionSpec("object.show_all", "Show all", "Object", "Alt+H", canvas=True),
     ActionSpec("object.lock", "Lock", "Object", "Ctrl+L", "Not picked or moved in the picture",

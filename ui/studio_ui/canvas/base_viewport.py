@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 import numpy.typing as npt
@@ -18,7 +18,7 @@ from studio_ui.canvas.glyphs import Glyph
 from studio_ui.canvas.hand import Hand
 from studio_ui.canvas.overlay import NOTHING, Overlay, glyph_near, guides
 from studio_ui.canvas.overlay_painter import paint_badge, paint_message, paint_overlay
-from studio_ui.canvas.projection import eye_of, ray
+from studio_ui.canvas.projection import eye_of, project, ray
 from studio_ui.canvas.viewport import Probe
 from studio_ui.feed import Freshness
 from studio_ui.theme import DARK, Theme
@@ -174,3 +174,27 @@ class BaseViewport(Hand):
         """The lamp or camera drawn near a point of the canvas."""
         view = self._guide_view or self._view
         return glyph_near(self._glyphs, view, x, y, (self.width(), self.height()))
+
+    def seen_in(
+        self, start: tuple[float, float], end: tuple[float, float]
+    ) -> Mapping[NodeId, tuple[int, int]]:
+        """By node: pixels between two points of the canvas, and all its pixels; a lamp or camera is one."""
+        low, high = np.minimum(start, end), np.maximum(start, end)
+        made: dict[NodeId, tuple[int, int]] = {}
+        if self._picture is not None:
+            index, names, room = self._picture.node, self._picture.nodes, self.target()
+            corner, size = (room.left(), room.top()), (room.width(), room.height())
+            pixels = np.array(index.shape[::-1])
+            places = [(at * (self.width(), self.height()) - corner) / size * pixels for at in (low, high)]
+            (left, top), (right, bottom) = (np.clip(np.rint(at), 0, pixels).astype(int) for at in places)
+            inside, whole = (
+                np.bincount(part.ravel() + 1, minlength=len(names) + 1)
+                for part in (index[top:bottom, left:right], index)
+            )
+            made = {n: (int(inside[i]), int(whole[i])) for i, n in enumerate(names, 1) if whole[i]}
+        view = self._guide_view or self._view
+        for glyph in self._glyphs:
+            at = project(view, glyph.anchor)[0]
+            if np.isfinite(at).all():
+                made[glyph.node] = int(((at >= low) & (at <= high)).all()), 1
+        return made

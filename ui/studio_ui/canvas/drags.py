@@ -1,4 +1,4 @@
-"""Gestures as values: each turns where the mouse is into the edit that the gesture has come to.
+"""Gestures as values: each turns where the mouse is, or what was typed, into the edit it has come to.
 
 All edits are relative to the scene at the press; `Editing.preview` applies them to it.
 """
@@ -6,114 +6,174 @@ All edits are relative to the scene at the press; `Editing.preview` applies them
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
 
-from studio_core.edits import Edit, Move, SetFields
-from studio_core.scene.arranging import shifted, turned
+from studio_core.edits import Add, Compound, Edit, SetFields
+from studio_core.quantities import format_quantity
 from studio_core.scene.nodes import Environment, NodeId, Scene
 from studio_core.session import View
-from studio_ui.canvas.projection import axes_of, bounds, eye_of, ray
+from studio_ui.canvas.gizmos import COLOURS, Frame
+from studio_ui.canvas.overlay import Overlay, Wires
+from studio_ui.canvas.projection import bounds
+from studio_ui.canvas.snapping import Snap
 from studio_ui.canvas.viewport import Pointer
 
 F64 = npt.NDArray[np.float64]
-GRID = 0.05  # metres
-ANGLE_GRID = 15.0  # degrees
-_FLAT = 0.03  # sine of the lowest angle at which the floor is followed
-_FURTHEST = 12.0  # times the distance at the press
+_LINE = 50.0  # metres to either side that an axis is drawn
 
 
 class Drag(Protocol):
-    """A gesture between press and release."""
+    """A gesture between press and release. `unit` is that of what can be typed; None: nothing can."""
 
-    label: str
+    unit: str | None
+
+    @property
+    def label(self) -> str:
+        """What the history will call it."""
+        ...
 
     def edit(self, pointer: Pointer) -> Edit:
         """What the gesture does with the mouse there."""
         ...
 
+    def type(self, amount: float | None) -> None:
+        """From now on this amount counts, and not the mouse; None gives it back to the mouse."""
+        ...
 
-def named(scene: Scene, nodes: tuple[NodeId, ...], verb: str) -> str:
-    """`Move Chair`, `Move 3 objects`."""
-    return f"{verb} {scene[nodes[0]].name}" if len(nodes) == 1 else f"{verb} {len(nodes)} objects"
+    def told(self) -> str:
+        """How far it has come, in few words."""
+        ...
 
+    @property
+    def frame(self) -> Frame | None:
+        """Where the gizmo stands now."""
+        ...
 
-class MoveDrag:
-    """Over the horizontal plane through the point that was picked; with Shift up and down."""
-
-    def __init__(self, scene: Scene, nodes: tuple[NodeId, ...], view: View, point: npt.ArrayLike) -> None:
-        self.label = named(scene, nodes, "Move")
-        self._scene, self._nodes, self._view = scene, nodes, view
-        self._point = np.asarray(point, np.float64)
-        self._delta = np.zeros(3)
-        self._vertical = False
-        self._base, self._grip = np.zeros(3), self._point
-        self._lead = np.array(scene.world(nodes[0]).translation)
-
-    def edit(self, pointer: Pointer) -> Move:
-        """The nodes so that the picked point lies under the mouse."""
-        if pointer.shift != self._vertical:  # go on from here along the other directions
-            self._vertical = pointer.shift
-            self._base = self._delta
-            self._grip = self._touch(pointer, self._point + self._base)
-        step = self._touch(pointer, self._point + self._base) - self._grip
-        step = step * (0, 1, 0) if self._vertical else step * (1, 0, 1)
-        delta = self._base + step
-        if pointer.ctrl:
-            snapped = np.round((self._lead + delta) / GRID) * GRID - self._lead
-            delta = np.where(np.abs(step) > 0, snapped, delta)
-        self._delta = delta
-        return Move(shifted(self._scene, self._nodes, delta), self.label)
-
-    def _touch(self, pointer: Pointer, through: F64) -> F64:
-        """Where the mouse's ray meets the plane through a point."""
-        eye, towards = eye_of(self._view), ray(self._view, pointer.x, pointer.y)
-        back = axes_of(self._view)[2]
-        normal = np.array([0.0, 1.0, 0.0])
-        if self._vertical:
-            normal = np.array([back[0], 0.0, back[2]])
-            length = np.linalg.norm(normal)
-            normal = normal / length if length > 1e-6 else back
-        elif abs(towards[1]) < _FLAT or (towards[1] * (through - eye)[1]) <= 0:
-            normal = back  # near the horizon: follow the hand in the picture's plane
-        slope = float(towards @ normal)
-        if abs(slope) < 1e-9:
-            return through
-        reach = float((through - eye) @ normal) / slope
-        furthest = _FURTHEST * max(float(np.linalg.norm(through - eye)), 0.1)
-        return eye + towards * float(np.clip(reach, 0.0, furthest))
+    def marks(self) -> Overlay:
+        """What the gesture has to show."""
+        ...
 
 
-class TurnDrag:
-    """About the vertical through the middle of what is turned; with Ctrl in steps."""
+@dataclass(frozen=True, eq=False)
+class Hold:
+    """What was taken hold of: nodes of a scene that is seen through `view`, at a point (3,) of the world.
 
-    def __init__(self, scene: Scene, nodes: tuple[NodeId, ...], start: Pointer) -> None:
-        self.label = named(scene, nodes, "Turn")
-        self._scene, self._nodes, self._from = scene, nodes, start.x
-        self._pivot = middle(scene, nodes)
+    `copies` leaves the nodes and moves copies of them; `called` is what the history calls them.
+    """
 
-    def edit(self, pointer: Pointer) -> Move:
-        """A drag across the picture is one turn."""
-        degrees = (pointer.x - self._from) * 360
-        if pointer.ctrl:
-            degrees = round(degrees / ANGLE_GRID) * ANGLE_GRID
-        return Move(turned(self._scene, self._nodes, degrees, self._pivot), self.label)
+    scene: Scene
+    nodes: tuple[NodeId, ...]
+    view: View
+    frame: Frame
+    press: Pointer
+    grip: F64
+    snap: Snap = Snap()
+    copies: bool = False
+    world_axes: bool = True
+    called: str = ""
+
+    def title(self, verb: str) -> str:
+        """`Move Chair`, `Copy 3 objects`."""
+        return f"{'Copy' if self.copies else verb} {self.called}"
+
+    def magnet(self, pointer: Pointer) -> bool:
+        """Whether things snap now: Ctrl turns it round."""
+        return self.snap.on != pointer.ctrl
+
+    def axis_line(self, axis: int) -> Overlay:
+        """The line that a movement keeps to."""
+        along = self.frame.axes[axis] * _LINE
+        line = np.array([[self.frame.pivot - along, self.frame.pivot + along]])
+        return Overlay((Wires(line, f"#99{COLOURS[axis][1:]}", 1.0, bare=True),))
+
+
+class CopyDrag:
+    """The same gesture with `copies`, which `add` makes."""
+
+    def __init__(self, add: Add, copies: tuple[NodeId, ...], inner: Drag) -> None:
+        self.add, self.copies, self._inner = add, copies, inner
+        self.unit = inner.unit
+
+    @property
+    def label(self) -> str:
+        """`Copy Chair 80 cm along X`."""
+        return self._inner.label
+
+    def edit(self, pointer: Pointer) -> Compound:
+        """New copies, moved."""
+        edit = self._inner.edit(pointer)
+        return Compound(edit.label, (self.add, edit))
+
+    def type(self, amount: float | None) -> None:
+        """See `Drag`."""
+        self._inner.type(amount)
+
+    def told(self) -> str:
+        """See `Drag`."""
+        return self._inner.told()
+
+    @property
+    def frame(self) -> Frame | None:
+        """See `Drag`."""
+        return self._inner.frame
+
+    def marks(self) -> Overlay:
+        """See `Drag`."""
+        return self._inner.marks()
 
 
 class LightDrag:
     """Turns the environment about the vertical."""
 
-    label = "Rotate light"
+    label, unit, frame = "Rotate light", "°", None
 
     def __init__(self, environment: Environment, start: Pointer) -> None:
         self._node, self._from, self._azimuth = environment.id, start.x, environment.azimuth
+        self._turned = 0.0
+        self._typed: float | None = None
 
     def edit(self, pointer: Pointer) -> SetFields:
         """A drag across the picture is one turn."""
-        azimuth = (self._azimuth + (pointer.x - self._from) * 360) % 360
-        return SetFields(self._node, {"azimuth": azimuth}, self.label)
+        self._turned = (pointer.x - self._from) * 360 if self._typed is None else self._typed
+        return SetFields(self._node, {"azimuth": (self._azimuth + self._turned) % 360}, self.label)
+
+    def type(self, amount: float | None) -> None:
+        """Degrees."""
+        self._typed = amount
+
+    def told(self) -> str:
+        """The angle."""
+        return angle_words(self._turned)
+
+    def marks(self) -> Overlay:
+        """Nothing: the light is seen."""
+        return Overlay()
+
+
+def named(scene: Scene, nodes: tuple[NodeId, ...], verb: str) -> str:
+    """`Move Chair`, `Move 3 objects`."""
+    return f"{verb} {called(scene, nodes)}"
+
+
+def called(scene: Scene, nodes: tuple[NodeId, ...]) -> str:
+    """`Chair`, `3 objects`."""
+    return scene[nodes[0]].name if len(nodes) == 1 else f"{len(nodes)} objects"
+
+
+def length_words(metres: float) -> str:
+    """`80 cm`, `1.25 m`, `-3 mm`."""
+    if abs(metres) >= 1:
+        return format_quantity(metres, "m", decimals=3)
+    return format_quantity(metres, "m", "cm", 1 if abs(metres) >= 0.1 else 2)
+
+
+def angle_words(degrees: float) -> str:
+    """`15°`, `-2.5°`."""
+    return format_quantity(degrees, "°", decimals=1)
 
 
 def middle(scene: Scene, nodes: Iterable[NodeId]) -> F64:

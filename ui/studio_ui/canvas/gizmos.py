@@ -30,7 +30,7 @@ LIT, PLAIN = "#ffd54a", "#f2f2f0"
 NAMES = ("X", "Y", "Z")
 _START, _RING, _VIEW_RING = 0.2, 0.92, 1.14  # of an arm
 _PLANE = (0.32, 0.56)
-_TIP, _TIP_WIDTH, _KNOB = 0.17, 0.05, 0.055
+_TIP, _TIP_WIDTH, _KNOB = 0.22, 0.07, 0.06
 _ALONG, _EDGE_ON = 0.975, 0.2  # cosines: an axis too much along the line of sight, a plane too much across
 _ROUND = 72
 
@@ -132,7 +132,7 @@ class Gizmo:
 
     def _drawn(self, handle: Handle, lit: bool) -> list[Mark]:
         colour = LIT if lit else COLOURS[handle.axis] if handle.axis >= 0 else PLAIN
-        width = 3.0 if lit else 2.0
+        width = 3.5 if lit else 2.5
         if handle.kind == "plane":
             square = self._square(handle.axis)
             edges = np.stack([square, np.roll(square, -1, axis=0)], axis=1)
@@ -197,7 +197,7 @@ class Gizmo:
         return project(self._view, points) * self._size
 
 
-def meaning(handle: Handle, tool: str, local: bool = False) -> str:
+def meaning(handle: Handle, local: bool = False) -> str:
     """What dragging a handle does, for the status bar."""
     own = "its own " if local else ""
     if handle.kind == "axis":

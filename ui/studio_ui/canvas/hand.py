@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from PySide6.QtCore import QEvent, QPointF, QSize, Qt
 from PySide6.QtGui import (
-    QFocusEvent,
     QInputDevice,
     QKeyEvent,
     QMouseEvent,
@@ -24,7 +25,17 @@ _BUTTONS: dict[Qt.MouseButton, Button] = {
 }
 _ANGLE_PIXELS = 0.5
 """Pixels that fingers slide for an eighth of a degree, where a touchpad tells no pixels."""
-_KEYS = {Qt.Key.Key_Escape: "escape", Qt.Key.Key_R: "r"}
+_KEYS = {
+    Qt.Key.Key_Escape: "escape",
+    Qt.Key.Key_Return: "enter",
+    Qt.Key.Key_Enter: "enter",
+    Qt.Key.Key_Backspace: "backspace",
+}
+_ALWAYS = frozenset({"escape", *(f"{shift}{axis}" for shift in ("", "shift+") for axis in "xyz")})
+"""Keys that come here while no shortcut of the window has them."""
+_COMMANDS = (
+    Qt.KeyboardModifier.ControlModifier | Qt.KeyboardModifier.AltModifier | Qt.KeyboardModifier.MetaModifier
+)
 
 
 class Hand(QWidget):
@@ -41,6 +52,7 @@ class Hand(QWidget):
         self.left: Signal[[]] = Signal()
         self.resized: Signal[[int, int]] = Signal()
         self._held: Button = "none"
+        self._wanted: Callable[[str], bool] = lambda name: False
         self.setMouseTracking(True)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
@@ -95,7 +107,12 @@ class Hand(QWidget):
         event.accept()
 
     def event(self, event: QEvent) -> bool:
-        """Two fingers that spread or close."""
+        """Two fingers that spread or close; the keys that are wanted are taken from the shortcuts."""
+        if isinstance(event, QKeyEvent) and event.type() is QEvent.Type.ShortcutOverride:
+            name = _name(event)
+            if name and self._wanted(name):
+                event.accept()
+                return True
         if isinstance(event, QNativeGestureEvent):
             if event.gestureType() is Qt.NativeGestureType.ZoomNativeGesture:
                 self.pinch.emit(self._pointer("move", event.position(), event.modifiers()), event.value())
@@ -115,16 +132,16 @@ class Hand(QWidget):
         """The end of it."""
         self._key(event, False)
 
-    def focusOutEvent(self, event: QFocusEvent) -> None:
-        """Keys that are still held count as released."""
-        self.key.emit("r", False)
-        super().focusOutEvent(event)
+    def want_keys(self, wanted: Callable[[str], bool]) -> None:
+        """Keys of these names come before all shortcuts of the window."""
+        self._wanted = wanted
 
     def _key(self, event: QKeyEvent, pressed: bool) -> None:
-        name = _KEYS.get(Qt.Key(event.key()))
-        if name is not None and not event.modifiers() and not event.isAutoRepeat():
-            self.key.emit(name, pressed)
-        elif name is None:
+        name = _name(event)
+        if name and (name in _ALWAYS or self._wanted(name)):
+            if name in ("backspace", "enter") or not event.isAutoRepeat():
+                self.key.emit(name, pressed)
+        else:
             event.ignore()
 
     def _send(self, kind: str, event: QMouseEvent) -> None:
@@ -149,3 +166,15 @@ def _fingers(event: QWheelEvent) -> bool:
         return True
     device = event.device()
     return device is not None and device.type() is QInputDevice.DeviceType.TouchPad
+
+
+def _name(event: QKeyEvent) -> str:
+    """As `Viewport.want_keys` tells; empty for keys without one."""
+    if event.modifiers() & _COMMANDS:
+        return ""
+    known = _KEYS.get(Qt.Key(event.key()))
+    text = event.text()
+    if known is not None or len(text) != 1 or not text.isprintable():
+        return known or ""
+    small = text.lower()
+    return f"shift+{small}" if small != text and text.isalpha() else text

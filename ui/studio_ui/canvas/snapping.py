@@ -6,7 +6,7 @@ is when it is snapped again.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -42,8 +42,23 @@ class Snap:
 
 
 @dataclass(frozen=True, eq=False)
+class Pull:
+    """What pulls at a movement, within `tolerance` metres.
+
+    Where nothing is met, the point `lead` comes to multiples of `step` metres (0: anywhere). `heights` are
+    those that a foot can stand on.
+    """
+
+    tolerance: float
+    step: float = 0.0
+    lead: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    objects: bool = True
+    heights: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
 class Met:
-    """What a movement has met along an axis: the plane at `at` metres, of `other` (None: the floor)."""
+    """The plane at `at` metres along an axis, of `other` among the neighbours (None: what carries)."""
 
     axis: int
     at: float
@@ -64,59 +79,41 @@ class Neighbours:
                 boxes.append(other)
         self.boxes: F64 = np.array(boxes).reshape(-1, 2, 3)
 
-    def snapped(
-        self,
-        delta: npt.ArrayLike,
-        axes: Sequence[int],
-        tolerance: float,
-        *,
-        step: float = 0.0,
-        lead: npt.ArrayLike = (0.0, 0.0, 0.0),
-        objects: bool = True,
-        floor: bool = True,
-    ) -> tuple[F64, list[Met]]:
-        """A displacement (3,) changed along `axes` so that the moved box meets something; and what it met.
-
-        Where it meets nothing, the point `lead` comes to multiples of `step` metres (0: anywhere).
-        """
+    def snapped(self, delta: npt.ArrayLike, axes: Sequence[int], pull: Pull) -> tuple[F64, list[Met]]:
+        """A displacement (3,) changed along `axes` so that the moved box meets something; and what it met."""
         made = np.array(delta, np.float64)
         met: list[Met] = []
         for _ in range(_PASSES):
             before = made.copy()
-            met = []
-            for axis in axes:
-                made[axis], found = self._along(made, axis, tolerance, step, np.asarray(lead), objects, floor)
-                if found is not None:
-                    met.append(found)
+            found = [self._along(made, axis, pull) for axis in axes]
+            for axis, (at, _) in zip(axes, found, strict=True):
+                made[axis] = at
+            met = [one for _, one in found if one is not None]
             if np.array_equal(before, made):
                 break
         return made, met
 
-    def _along(
-        self, delta: F64, axis: int, tolerance: float, step: float, lead: F64, objects: bool, floor: bool
-    ) -> tuple[float, Met | None]:
-        places, mets = self._places(delta, axis, objects, floor)
-        found = _nearest(places, delta[axis], tolerance)
-        still = min(tolerance, step / 2) if step else tolerance / 2
-        if abs(delta[axis]) < still and (
-            found is None or abs(places[found] - delta[axis]) >= abs(delta[axis])
-        ):
+    def _along(self, delta: F64, axis: int, pull: Pull) -> tuple[float, Met | None]:
+        here, step = float(delta[axis]), pull.step
+        places, mets = self._places(delta, axis, pull)
+        found = _nearest(places, here, pull.tolerance)
+        still = min(pull.tolerance, step / 2) if step else pull.tolerance / 2
+        if abs(here) < still and (found is None or abs(places[found] - here) >= abs(here)):
             return 0.0, next((mets[i] for i in np.flatnonzero(np.abs(places) < 1e-9)), None)
         if found is None and step:
-            rounded = float(np.round((lead[axis] + delta[axis]) / step) * step - lead[axis])
-            found = _nearest(places, rounded, tolerance)
-            if found is None:
-                return rounded, None
-        return (float(places[found]), mets[found]) if found is not None else (float(delta[axis]), None)
+            lead = float(pull.lead[axis])
+            here = round((lead + here) / step) * step - lead
+            found = _nearest(places, here, pull.tolerance)
+        return (float(places[found]), mets[found]) if found is not None else (here, None)
 
-    def _places(self, delta: F64, axis: int, objects: bool, floor: bool) -> tuple[F64, list[Met]]:
+    def _places(self, delta: F64, axis: int, pull: Pull) -> tuple[F64, list[Met]]:
         """Displacements along an axis at which something is met."""
         places: list[float] = []
         mets: list[Met] = []
         if self.box is None:
             return np.zeros(0), mets
         mine = (self.box[0, axis], self.box[1, axis], self.box[:, axis].mean())
-        if objects:
+        if pull.objects:
             moved = self.box + delta
             across = [other for other in range(3) if other != axis]
             gap = np.maximum(self.boxes[:, 0] - moved[1], moved[0] - self.boxes[:, 1])[:, across]
@@ -126,21 +123,20 @@ class Neighbours:
                 for here, there in _STUDS:
                     places.append(theirs[there] - mine[here])
                     mets.append(Met(axis, float(theirs[there]), int(index)))
-        if floor and axis == 1:
-            places.append(-mine[0])
-            mets.append(Met(1, 0.0, None))
+        for height in pull.heights if axis == 1 else ():
+            places.append(height - mine[0])
+            mets.append(Met(1, height, None))
         return np.array(places, np.float64), mets
 
-    def guides(self, delta: F64, met: Sequence[Met], told: object = None) -> Overlay:
-        """Lines to what was met, with the distance between the two; `told` makes words of metres."""
-        words = told if callable(told) else (lambda metres: f"{metres:.2f} m")
+    def guides(self, delta: F64, met: Sequence[Met], words: Callable[[float], str]) -> Overlay:
+        """Lines to what was met, with the distance between the two; `words` tells metres."""
         marks: list[Mark] = []
         if self.box is None:
             return Overlay()
         moved = self.box + delta
         for one in met:
             if one.other is None:
-                continue  # that it stands on the floor is seen
+                continue  # that it stands is seen
             other = self.boxes[one.other]
             marks += _guide(one, moved, other, self.names[one.other], words)
         return Overlay(tuple(marks))
@@ -186,9 +182,8 @@ def _others(scene: Scene, moving: Sequence[NodeId], box: F64) -> list[tuple[Node
     return found
 
 
-def _guide(met: Met, moved: F64, other: F64, name: str, words: object) -> list[Mark]:
+def _guide(met: Met, moved: F64, other: F64, name: str, words: Callable[[float], str]) -> list[Mark]:
     """In the plane that was met: from one box to the other, and around the other."""
-    assert callable(words)
     start, end = np.zeros(3), np.zeros(3)
     gap = 0.0
     for axis in range(3):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 import numpy as np
@@ -121,6 +121,10 @@ class SwitchViewport(QWidget):
         """Colours around and over the picture."""
         self._tell("set_theme", theme)
 
+    def want_keys(self, wanted: Callable[[str], bool]) -> None:
+        """Keys that come before all shortcuts."""
+        self._tell("want_keys", wanted)
+
     # what every canvas answers
 
     def probe(self, x: float, y: float) -> Probe | None:
@@ -130,6 +134,12 @@ class SwitchViewport(QWidget):
     def glyph_at(self, x: float, y: float) -> NodeId | None:
         """The lamp or camera drawn near a point of the canvas."""
         return self.inner.glyph_at(x, y)
+
+    def seen_in(
+        self, start: tuple[float, float], end: tuple[float, float]
+    ) -> Mapping[NodeId, tuple[int, int]]:
+        """By node: pixels between two points of the canvas, and all its pixels."""
+        return self.inner.seen_in(start, end)
 
     def grab_image(self) -> QImage:
         """The canvas as it is seen."""

@@ -1,7 +1,8 @@
-"""What the mouse does in the picture: choose, look around, move, turn.
+"""What the mouse does in the picture: choose, look around, move, turn, scale.
 
-A click chooses. A drag on what is chosen moves it (or turns it, with the turn tool or R held); any other left
-drag looks around, so that furniture is not moved by accident.
+A click chooses; a drag of a gizmo's handle, or of what is chosen, edits it; with the select tool a drag
+draws a band around what is to be chosen. Every other drag looks around, so that furniture is not moved by
+accident.
 """
 
 from __future__ import annotations
@@ -16,16 +17,21 @@ from studio_core.scene.diff import Changes
 from studio_core.scene.nodes import Environment, NodeId, Scene
 from studio_core.session import Session
 from studio_core.signal import Signal
-from studio_ui.canvas.drags import Drag, LightDrag, MoveDrag, TurnDrag
+from studio_ui.canvas.drags import Hold, LightDrag, called
+from studio_ui.canvas.gizmos import Frame, Gizmo, Handle, meaning
 from studio_ui.canvas.glyphs import glyphs
+from studio_ui.canvas.holding import AXES, Holding
 from studio_ui.canvas.looking import Looking
+from studio_ui.canvas.overlay import Band, Overlay
+from studio_ui.canvas.picking import caught, is_held, joined, owner
 from studio_ui.canvas.projection import bounds, box_segments
 from studio_ui.canvas.viewport import Pointer, Viewport
 from studio_ui.editing import Editing
 from studio_ui.feed import PictureFeed
+from studio_ui.magnet import Magnet
 
 CLICK = 4.0  # logical pixels that a click may slip
-TOOLS = ("select", "move", "rotate")
+TOOLS = ("select", "move", "rotate", "scale")
 
 
 class CanvasTools:
@@ -38,30 +44,39 @@ class CanvasTools:
         session: Session,
         editing: Editing,
         feed: PictureFeed,
+        magnet: Magnet,
         hint: Callable[[str], None] = lambda text: None,
     ) -> None:
         self.tool = "move"
         self.tool_changed: Signal[[str]] = Signal()
         self.entered: NodeId | None = None  # the group whose parts are chosen
-        self._viewport, self._document, self._session = viewport, document, session
         self.looking = Looking(viewport, document, session, feed)
-        self._editing, self._hint = editing, hint
+        self.holding = Holding(editing, session, hint)
+        self._viewport, self._document, self._session = viewport, document, session
+        self._editing, self._magnet, self._hint = editing, magnet, hint
         self._press: Pointer | None = None
-        self._mode = ""  # "", click, look, drag
-        self._drag: Drag | None = None
-        self._turning = False  # R is held
+        self._last = Pointer("move", 0.5, 0.5)
+        self._mode = ""  # "", click, look, hold, band
+        self._lit: Handle | None = None  # under the mouse, or pressed
+        self._banding = False  # the next drag draws a band
+        self._placed: tuple[object, Frame | None] | None = None
+        viewport.want_keys(self._wants)
         self._off = [
             viewport.pointer.connect(self._on_pointer),
             viewport.wheel.connect(self._on_wheel),
             viewport.key.connect(self._on_key),
+            viewport.left.connect(self._on_left),
             document.changed.connect(self._on_document),
             session.changed.connect(lambda _: self.refresh()),
             session.selected.connect(self.refresh),
+            editing.settled.connect(self._on_settled),
+            magnet.changed.connect(self.refresh),
         ]
 
     def close(self) -> None:
         """Stop listening."""
         self.looking.close()
+        self.holding.close()
         for off in self._off:
             off()
 
@@ -69,18 +84,25 @@ class CanvasTools:
         """Choose a tool of `TOOLS`."""
         if tool != self.tool:
             self.tool = tool
+            self._lit = None
             self.tool_changed.emit(tool)
+            self.refresh()
+
+    def band(self) -> None:
+        """The next drag chooses what lies in a rectangle, whatever the tool."""
+        self._banding = True
+        self._hint("Drag to the right around what is to be chosen; to the left: whatever is touched")
 
     def refresh(self) -> None:
-        """Outline and lines as scene, selection and view are now."""
+        """Outline, lines and gizmo as scene, selection and view are now."""
         scene, view = self._document.scene, self._session.view
         chosen = [n for n in self._session.selection if n in scene.nodes]
         self._viewport.set_selection(below for node in chosen for below in scene.subtree(node))
         boxes = None
-        found = bounds(scene, chosen) if self._mode in ("drag", "look") and chosen else None
+        found = bounds(scene, chosen) if self._mode in ("hold", "look") and chosen else None
         if found is not None:
             boxes = box_segments(*found)
-        self._viewport.set_guides(view, glyphs(scene, view, chosen), boxes)
+        self._viewport.set_guides(view, glyphs(scene, view, chosen), boxes, self._overlay())
 
     def pick(self, pointer: Pointer, deep: bool = False) -> NodeId | None:
         """What a click there means: the topmost group of what is seen, or a part of the entered one."""
@@ -92,14 +114,23 @@ class CanvasTools:
             return None
         return node if deep else owner(scene, node, self.entered)
 
+    def gizmo(self) -> Gizmo | None:
+        """The handles of the tool in use, on what is chosen."""
+        frame = self.holding.frame or self._frame()
+        if self.tool == "select" or frame is None:
+            return None
+        return Gizmo(self.tool, frame, self._session.view, self._size())
+
     def cancel(self) -> bool:
-        """Esc: roll a gesture back, else leave the entered group, else choose nothing."""
-        if self._mode == "drag":
-            self._mode, self._drag = "", None
-            self._editing.cancel(self)
-            self.refresh()
+        """Esc: put back what is held, drop the band, leave the entered group, or choose nothing."""
+        if self.holding.active:
+            self.holding.cancel()
             return True
         if self._editing.cancel_any():
+            return True
+        if self._mode == "band" or self._banding:
+            self._mode, self._banding = "", False
+            self.refresh()
             return True
         if self.entered is not None:
             entered, self.entered = self.entered, None
@@ -111,19 +142,35 @@ class CanvasTools:
     # events
 
     def _on_pointer(self, pointer: Pointer) -> None:
-        if pointer.kind == "press":
+        self._last = pointer
+        if self.holding.keyed:
+            self._follow_without_button(pointer)
+        elif pointer.kind == "press":
             self._pressed(pointer)
         elif pointer.kind == "double":
             self._pressed(pointer)
-            self._enter(pointer)
+            if self._lit is None:
+                self._enter(pointer)
         elif pointer.kind == "move" and self._press is not None:
             self._moved(pointer)
+        elif pointer.kind == "move":
+            self._light(pointer)
         elif pointer.kind == "release" and self._press is not None:
             self._released(pointer)
 
+    def _follow_without_button(self, pointer: Pointer) -> None:
+        if pointer.kind == "move":
+            self.holding.move(pointer)
+        elif pointer.kind == "press" and pointer.button == "right":
+            self.holding.cancel()
+        elif pointer.kind == "press":
+            self.holding.commit()
+
     def _pressed(self, pointer: Pointer) -> None:
-        self._press = pointer
-        self._mode = "click"
+        self._press, self._mode = pointer, "click"
+        gizmo = self.gizmo()
+        plain = pointer.button == "left" and not self._banding
+        self._lit = gizmo.pick(pointer.x, pointer.y) if gizmo is not None and plain else None
 
     def _enter(self, pointer: Pointer) -> None:
         scene = self._document.scene
@@ -138,61 +185,96 @@ class CanvasTools:
         if self.entered is not None:
             self._hint(f"Parts of {scene[self.entered].name} can be chosen; Esc leaves it")
 
+    def _light(self, pointer: Pointer) -> None:
+        """The handle under the mouse."""
+        gizmo = self.gizmo()
+        lit = gizmo.pick(pointer.x, pointer.y) if gizmo is not None else None
+        if lit != self._lit:
+            self._lit = lit
+            if lit is not None:
+                self._hint(meaning(lit, self._magnet.local_axes))
+            self.refresh()
+
     def _moved(self, pointer: Pointer) -> None:
         assert self._press is not None
         if self._mode == "click" and _slip(self._press, pointer) > CLICK:
             self._start(self._press)
         if self._mode == "look":
             self.looking.move(pointer)
-        elif self._mode == "drag" and self._drag is not None:
-            self._editing.preview(self, self._drag.edit(pointer))
+        elif self._mode == "hold":
+            self.holding.move(pointer)
+        elif self._mode == "band":
+            self.refresh()
 
     def _start(self, press: Pointer) -> None:
         """A click has become a drag."""
-        self._drag = self._drag_for(press, self._document.scene)
         looks = self.looking.mode_of(press)
-        if self._drag is None and looks is not None:
+        if self._take(press):
+            self._mode = "hold"  # the window holds for every gesture that edits
+        elif self._editing.busy:
+            self._mode = ""
+        elif press.button == "left" and not press.alt and (self._bands() or looks is None):
+            self._mode = "band"
+        elif looks is not None:
             self._mode = "look"
             self.looking.start(looks, press)
-        elif self._drag is None:
-            self._mode = ""
-            return
-        elif self._editing.begin(self, self._drag.label):
-            self._mode = "drag"  # the window holds for every gesture that edits
         else:
-            self._mode, self._drag = "", None
-            return
+            self._mode = ""
         self.refresh()
 
-    def _drag_for(self, press: Pointer, scene: Scene) -> Drag | None:
+    def _bands(self) -> bool:
+        return self._banding or self.tool == "select"
+
+    def _take(self, press: Pointer) -> bool:
+        """Take hold of what was pressed, if that is meant."""
+        scene = self._document.scene
         if self.looking.turns_light(press):
             environment = next((e for e in scene.of(Environment) if scene.shown(e.id)), None)
-            return LightDrag(environment, press) if environment is not None else None
-        if press.button != "left" or press.alt or (self.tool == "select" and not self._turning):
-            return None
-        picked = self.pick(press)
-        if picked is None or not _held(scene, picked, self._session.selection):
-            return None
+            return environment is not None and self.holding.take(LightDrag(environment, press))
+        if press.button != "left" or self._bands():
+            return False
+        if self._lit is None:
+            picked = self.pick(press)
+            if picked is None or not is_held(scene, picked, self._session.selection):
+                return False
+            point = self.looking.touched(press.x, press.y)
+            if point is None or self._viewport.glyph_at(press.x, press.y) is not None:
+                point = np.array(scene.world(picked).translation)
+        else:
+            point = None
+        hold = self._hold(press, point)
+        return hold is not None and self.holding.start(self.tool, hold, self._lit)
+
+    def _hold(self, press: Pointer, point: np.ndarray | None = None) -> Hold | None:
+        scene, frame = self._document.scene, self._frame()
         nodes = roots(scene, self._session.selection)
-        if not nodes:
+        if frame is None or not nodes:
             return None
-        if self.tool == "rotate" or self._turning:
-            return TurnDrag(scene, nodes, press)
-        point = self.looking.touched(press.x, press.y)
-        if point is None or self._viewport.glyph_at(press.x, press.y) is not None:
-            point = np.array(scene.world(picked).translation)
-        return MoveDrag(scene, nodes, self._session.view, point)
+        return Hold(
+            scene,
+            nodes,
+            self._session.view,
+            frame,
+            press,
+            frame.pivot if point is None else point,
+            self._magnet.snap,
+            press.alt,
+            not self._magnet.local_axes,
+            called(scene, nodes),
+        )
 
     def _released(self, pointer: Pointer) -> None:
         mode, self._mode = self._mode, ""
         press, self._press = self._press, None
-        self._drag = None
-        if mode == "click" and press is not None and press.button == "left":
+        if mode == "click" and press is not None and press.button == "left" and self._lit is None:
             self._click(pointer)
-        elif mode == "drag":
-            self._editing.commit(self)
+        elif mode == "hold":
+            self.holding.commit()
         elif mode == "look":
             self.looking.end()
+        elif mode == "band" and press is not None:
+            self._catch(press, pointer)
+        self._banding = False
         self.refresh()
 
     def _click(self, pointer: Pointer) -> None:
@@ -207,37 +289,87 @@ class CanvasTools:
             self.entered = None
         self._session.select([picked] if picked is not None else [])
 
+    def _catch(self, press: Pointer, pointer: Pointer) -> None:
+        """Choose what the band holds: to the right what lies in it, to the left what it touches."""
+        counts = self._viewport.seen_in((press.x, press.y), (pointer.x, pointer.y))
+        found = caught(self._document.scene, counts, self.entered, whole=pointer.x >= press.x)
+        more = press.ctrl or press.shift or pointer.ctrl or pointer.shift
+        self._session.select(joined(self._session.selection, found) if more else found)
+
     def _on_wheel(self, pointer: Pointer, steps: float) -> None:
-        if self._mode != "drag":
+        if not self.holding.active:
             self.looking.wheel(pointer, steps)
 
+    def _on_left(self) -> None:
+        if self._lit is not None and self._press is None:
+            self._lit = None
+            self.refresh()
+
+    def _wants(self, key: str) -> bool:
+        return self.holding.wants(key)
+
     def _on_key(self, key: str, pressed: bool) -> None:
-        if key == "escape" and pressed:
+        if not pressed:
+            return
+        if self.holding.key(key):
+            self.refresh()
+        elif key == "escape":
             self.cancel()
-        elif key == "r":
-            self._turning = pressed
+        elif key.removeprefix("shift+") in AXES and self._press is None:
+            self._key_axis(key)
+
+    def _key_axis(self, key: str) -> None:
+        """An axis key: from now on the mouse, or what is typed, moves what is chosen along it."""
+        hold = self._hold(self._last) if self.tool != "select" else None
+        if hold is None:
+            return
+        kind = {"move": "axis", "rotate": "ring", "scale": "size"}[self.tool]
+        if key.startswith("shift+") and self.tool == "move":
+            kind = "plane"
+        handle = Handle(kind, AXES[key.removeprefix("shift+")])  # type: ignore[arg-type]
+        if self.holding.start(self.tool, hold, handle, keyed=True):
+            self._hint("Move the mouse or type an amount; a click or Enter keeps it, Esc does not")
+
+    def _on_settled(self) -> None:
+        """What was held is held no more, by whatever."""
+        if self._mode == "hold":
+            self._mode = ""
+        self._lit = None
+        self.refresh()
 
     def _on_document(self, before: Scene, after: Scene, changes: Changes) -> None:
         if self.entered is not None and self.entered not in after.nodes:
             self.entered = None
         self.refresh()
 
+    # what lies over the picture
 
-def owner(scene: Scene, node: NodeId, entered: NodeId | None) -> NodeId:
-    """The topmost group that holds a node; inside an entered group the part of it that holds the node."""
-    chain = [node, *(above.id for above in scene.ancestors(node))]
-    if entered in chain:
-        index = chain.index(entered)
-        return chain[index - 1] if index > 0 else node
-    return chain[-1]
+    def _overlay(self) -> Overlay:
+        if self._mode == "band" and self._press is not None:
+            start, end = (self._press.x, self._press.y), (self._last.x, self._last.y)
+            return Overlay((Band(start, end),))
+        gizmo = self.gizmo()
+        if self.holding.active:
+            return self.holding.marks(gizmo)
+        return gizmo.marks(self._lit) if gizmo is not None else Overlay()
+
+    def _frame(self) -> Frame | None:
+        """Where the gizmo stands; asked for often, made anew for another scene or selection."""
+        scene, selection = self._document.scene, self._session.selection
+        key = (scene, selection, self._magnet.local_axes)
+        if self._placed is None or not _same(self._placed[0], key):
+            nodes = roots(scene, selection)
+            self._placed = key, Frame.of(scene, nodes, local=key[2]) if nodes else None
+        return self._placed[1]
+
+    def _size(self) -> tuple[float, float]:
+        widget = self._viewport.widget
+        return float(max(widget.width(), 1)), float(max(widget.height(), 1))
 
 
-def _held(scene: Scene, picked: NodeId, selection: tuple[NodeId, ...]) -> bool:
-    """Whether what was picked is, or hangs under, or holds something chosen."""
-    chain = {picked, *(above.id for above in scene.ancestors(picked))}
-    if chain & set(selection):
-        return True
-    return any(picked in {a.id for a in scene.ancestors(n)} for n in selection if n in scene.nodes)
+def _same(known: object, key: tuple[Scene, tuple[NodeId, ...], bool]) -> bool:
+    assert isinstance(known, tuple)
+    return known[0] is key[0] and known[1:] == key[1:]
 
 
 def _slip(a: Pointer, b: Pointer) -> float:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Literal, Protocol
 
@@ -123,6 +123,20 @@ class Viewport(Protocol):
 
     def glyph_at(self, x: float, y: float) -> NodeId | None:
         """The lamp or camera drawn near a point of the canvas."""
+        ...
+
+    def seen_in(
+        self, start: tuple[float, float], end: tuple[float, float]
+    ) -> Mapping[NodeId, tuple[int, int]]:
+        """By node: pixels between two points of the canvas, and all its pixels; a lamp or camera is one."""
+        ...
+
+    def want_keys(self, wanted: Callable[[str], bool]) -> None:
+        """Keys of these names come as `key` signals, before all shortcuts of the window.
+
+        A letter is named as it is typed, with `shift+` before a capital one; others are `enter`,
+        `backspace`, `escape`. Keys with Ctrl, Alt or Meta have no name.
+        """
         ...
 
     def grab_image(self) -> QImage:
