@@ -42,6 +42,7 @@ from studio_ui.panels.panel import Panel, stacked
 from studio_ui.project_files import ProjectFiles
 from studio_ui.quality import QualityControl
 from studio_ui.settings import Settings
+from studio_ui.shortcuts import Shortcuts
 from studio_ui.status import StatusBar
 from studio_ui.transfer import Transfer
 from studio_ui.view_controls import ViewControls
@@ -73,6 +74,7 @@ class MainWindow(QMainWindow):
         self.setStatusBar(self.status)
         self.quality = QualityControl(context, width=64)
         self.status.addPermanentWidget(self.quality)
+        self.shortcuts = Shortcuts(settings)
         self.hints = HintBar(context, settings)
         self.ask = ask or Dialogs(self)
         thumbnails = thumbnails or Thumbnails(settings.folder / "thumbnails")
@@ -86,7 +88,9 @@ class MainWindow(QMainWindow):
         self.front = Front(context, viewport.widget, self.files, self._samples, load, self.drops.overlay)
         self.setCentralWidget(stacked(self.hints, self.front.widget))
         handlers, conditions = gather(features)
-        self.actions_ = ActionSet(self, viewport.widget, handlers, conditions, self.following.soon)
+        self.actions_ = ActionSet(
+            self, viewport.widget, handlers, conditions, self.following.soon, self.shortcuts
+        )
         for panel in self.panels.values():
             panel.use_actions(self.actions_.actions)
         self.menus = Menus(self.menuBar(), self.actions_, context, self.commands, self.files)

@@ -10,6 +10,8 @@ from typing import Any
 
 import platformdirs
 
+from studio_core.signal import Signal
+
 RECENT = 12
 
 
@@ -23,6 +25,7 @@ class Settings:
     """A mapping that is written when it changes. A damaged or unwritable file is as good as none."""
 
     def __init__(self, folder: Path) -> None:
+        self.changed: Signal[[str]] = Signal()  # the name of what has another value
         self.folder = folder
         self._file = folder / "window.json"
         self._values: dict[str, Any] = {}
@@ -48,6 +51,7 @@ class Settings:
             fresh = self._file.with_suffix(".new")
             fresh.write_text(json.dumps(self._values, indent=1), "utf-8")
             fresh.replace(self._file)
+        self.changed.emit(name)
 
     @property
     def recent(self) -> list[Path]:

@@ -12,6 +12,7 @@ from studio_ui.actions.catalogue import ACTIONS, specs
 from studio_ui.actions.spec import REASONS, ActionSpec
 from studio_ui.features import Condition, Handler
 from studio_ui.icons import icon
+from studio_ui.shortcuts import Shortcuts
 from studio_ui.theme import Theme
 
 
@@ -25,13 +26,14 @@ class ActionSet:
         handlers: Mapping[str, Handler],
         conditions: Mapping[str, Condition],
         done: Callable[[], object] = lambda: None,
+        shortcuts: Shortcuts | None = None,
     ) -> None:
         """`done` is called after an action. ValueError when handlers, conditions and actions do not match."""
         _match("handler", {spec.id for spec in specs()}, set(handlers))
         _match("condition", {name for spec in specs() for name in _asked(spec)}, set(conditions))
         self.actions: dict[str, QAction] = {}
         self.menus: dict[str, QMenu] = {}
-        self._conditions, self._done = conditions, done
+        self._conditions, self._done, self._shortcuts = conditions, done, shortcuts
         groups: dict[str, QActionGroup] = {}
         for spec in specs():
             action = self.actions[spec.id] = self._make(spec, owner, handlers[spec.id])
@@ -42,13 +44,12 @@ class ActionSet:
                 owner.addAction(action)
             if spec.group:
                 groups.setdefault(spec.group, QActionGroup(owner)).addAction(action)
+        self.label()
+        if shortcuts is not None:
+            shortcuts.changed.connect(self.label)
 
     def _make(self, spec: ActionSpec, owner: QWidget, handler: Handler) -> QAction:
         action = QAction(spec.text, owner)
-        if spec.shortcut:
-            action.setShortcut(QKeySequence(spec.shortcut))
-        keys = f" ({spec.shortcut})" if spec.shortcut else ""
-        action.setToolTip(f"{spec.text.rstrip('…')}{keys}" + (f"\n{spec.tip}" if spec.tip else ""))
         action.setStatusTip(spec.tip)
         action.setCheckable(spec.checkable)
         action.setIconVisibleInMenu(not spec.group)  # there the check mark tells
@@ -71,6 +72,15 @@ class ActionSet:
                 self.actions[spec.id].setEnabled(known[spec.enabled])
             if spec.checked:
                 self.actions[spec.id].setChecked(known[spec.checked])
+
+    def label(self) -> None:
+        """Keys as they are now, in menus and tooltips."""
+        for spec in specs():
+            keys = self._shortcuts.of(spec.id) if self._shortcuts is not None else spec.shortcut
+            action = self.actions[spec.id]
+            action.setShortcut(QKeySequence(keys))
+            told = f" ({action.shortcut().toString(QKeySequence.SequenceFormat.NativeText)})" if keys else ""
+            action.setToolTip(f"{spec.text.rstrip('…')}{told}" + (f"\n{spec.tip}" if spec.tip else ""))
 
     def reasons(self) -> dict[QAction, tuple[str, str]]:
         """Every action's id, and what is told while it is disabled."""

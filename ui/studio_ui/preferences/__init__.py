@@ -1,0 +1,1 @@
+"""Preferences: a declarative list, the dialog made from it, and the page of keys."""
