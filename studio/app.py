@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import faulthandler
+import os
 import subprocess
 import sys
 from collections.abc import Callable, Mapping
@@ -39,6 +40,8 @@ from studio_ui.feed import PictureFeed, Shading
 from studio_ui.files.thumbnails import Thumbnails
 from studio_ui.journal import Journal
 from studio_ui.main_window import MainWindow
+from studio_ui.preferences.catalogue import SYSTEM
+from studio_ui.preferences.store import Preferences
 from studio_ui.settings import Settings, state_folder
 from studio_ui.tasks import Tasks
 
@@ -118,7 +121,8 @@ def assemble(
 
     editing = Editing(document, journal.problem)
     tasks = Tasks(files, bridge.post, journal)
-    services = Services(workers, host, DiskCache(user_cache() / "computed"))
+    cache = DiskCache(user_cache() / "computed", cache_limit(settings))
+    services = Services(workers, host, cache)
     shading = shading or PluginShading(services)
     feed = PictureFeed(document, session, shading, compute, bridge.post, bridge.later)
     context = Context(document, session, editing, host, journal, tasks, feed, services, compute, bridge.quiet)
@@ -130,14 +134,22 @@ def assemble(
     return Studio(window, context, bridge, workers, (compute, files))
 
 
+def cache_limit(settings: Settings) -> int:
+    """Bytes that may be kept of what was computed."""
+    return round(Preferences(settings).get("cache") * 2**20)
+
+
 def run_window(path: Path | None, *, read_only: bool = False) -> int:
     """Open the window on a project (None: the sample room); the program's exit status."""
+    settings = Settings(state_folder())
+    scale = Preferences(settings).get("scale")
+    if scale != SYSTEM:
+        os.environ.setdefault("QT_SCALE_FACTOR", scale)
     QApplication.setAttribute(Qt.ApplicationAttribute.AA_ShareOpenGLContexts)
     application = QApplication.instance() or QApplication(sys.argv[:1])
     assert isinstance(application, QApplication)
     application.setApplicationName("Lucarne")
     application.setDesktopFileName("lucarne")
-    settings = Settings(state_folder())
     with _crash_log(settings.folder) as crashed:
         studio = assemble(settings=settings)
         compiling: list[subprocess.Popen[bytes]] = []

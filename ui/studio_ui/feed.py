@@ -148,6 +148,7 @@ class PictureFeed:
         self._document, self._session, self._shading = document, session, shading
         self._executor, self._post, self._later, self._clock = executor, post, later, clock
         self.pace = Pace()
+        self.rest_pixels = REST_PIXELS
         self._moving = 0  # gestures under way
         self._until = 0.0  # single steps (wheel, keys) count as moving until then
         self._changes = Changes()
@@ -182,6 +183,13 @@ class PictureFeed:
         if (width, height) != self.size and width > 0 and height > 0:
             self.size = (width, height)
             self._session.view = self._session.view.sized(width, height)
+            self.step()
+            self.want(view_changed())
+
+    def show_pixels(self, count: int) -> None:
+        """How many pixels a picture has at most while nothing moves."""
+        if count != self.rest_pixels:
+            self.rest_pixels = count
             self.step()
             self.want(view_changed())
 
@@ -230,7 +238,7 @@ class PictureFeed:
     def frame_view(self, moving: bool) -> View:
         """The session's view in the pixels and samples that are right while moving, or at rest."""
         width, height = self.size
-        limit = self.pace.pixels if moving else REST_PIXELS
+        limit = self.pace.pixels if moving else self.rest_pixels
         shrink = min(1.0, (limit / (width * height)) ** 0.5)
         view = self._session.view.sized(round(width * shrink), round(height * shrink))
         smooth = not moving and view.width * view.height * 4 <= REST_SAMPLES

@@ -11,16 +11,21 @@ from studio_core.registry import PluginHost
 from studio_ui.actions.catalogue import specs
 from studio_ui.actions.mouse import MOUSE
 from studio_ui.dialogs import KeysDialog, PluginsDialog
+from studio_ui.shortcuts import Shortcuts, shown
 
 
 class Help:
     """Windows that tell about the program."""
 
     def __init__(
-        self, parent: QWidget, host: PluginHost, looking: Callable[[], Iterable[tuple[str, str]]]
+        self,
+        parent: QWidget,
+        host: PluginHost,
+        shortcuts: Shortcuts,
+        looking: Callable[[], Iterable[tuple[str, str]]],
     ) -> None:
         """`looking` tells what the mouse does to the view."""
-        self._parent, self._host, self._looking = parent, host, looking
+        self._parent, self._host, self._shortcuts, self._looking = parent, host, shortcuts, looking
 
     def handlers(self) -> dict[str, Callable[[], object]]:
         """By action id."""
@@ -32,7 +37,8 @@ class Help:
 
     def keys(self) -> None:
         """What mouse and keys do."""
-        keys = [(spec.text.rstrip("…"), spec.shortcut) for spec in specs() if spec.shortcut]
+        own = ((spec.text.rstrip("…"), shown(self._shortcuts.of(spec.id))) for spec in specs())
+        keys = [(what, how) for what, how in own if how]
         KeysDialog(self._parent, [*MOUSE, *self._looking(), *keys]).open()
 
     def plugins(self) -> None:

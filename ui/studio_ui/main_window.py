@@ -9,6 +9,7 @@ from PySide6.QtCore import Qt, QTimer
 from PySide6.QtGui import QCloseEvent
 from PySide6.QtWidgets import QMainWindow, QToolBar, QWidget
 
+from studio_core.folders import user_cache
 from studio_core.shading.scheduler import Executor
 from studio_ui.actions.action_set import ActionSet
 from studio_ui.appearance import Appearance
@@ -39,6 +40,9 @@ from studio_ui.palette import Palette, menu_entries
 from studio_ui.panels.all import all_panels
 from studio_ui.panels.console import ConsoleDoor
 from studio_ui.panels.panel import Panel, stacked
+from studio_ui.preferences.effects import Effects
+from studio_ui.preferences.feature import PreferencesFeature
+from studio_ui.preferences.store import Preferences
 from studio_ui.project_files import ProjectFiles
 from studio_ui.quality import QualityControl
 from studio_ui.settings import Settings
@@ -74,7 +78,7 @@ class MainWindow(QMainWindow):
         self.setStatusBar(self.status)
         self.quality = QualityControl(context, width=64)
         self.status.addPermanentWidget(self.quality)
-        self.shortcuts = Shortcuts(settings)
+        self.shortcuts, self.preferences = Shortcuts(settings), Preferences(settings)
         self.hints = HintBar(context, settings)
         self.ask = ask or Dialogs(self)
         thumbnails = thumbnails or Thumbnails(settings.folder / "thumbnails")
@@ -122,11 +126,15 @@ class MainWindow(QMainWindow):
         self.transfer = Transfer(context, self.ask, self.files.beside)
         self.importing = Importing(context, self.ask, settings, self.viewing.frame_all)
         self.canvas = CanvasChoice(viewport, settings, context.journal.write)
-        self.appearance = Appearance(settings, viewport, self.canvas)
+        self.appearance = Appearance(self.preferences, viewport, self.canvas)
         self.layout_ = Layout(self, settings, self._panels())
         self.panels, self.docks = self.layout_.panels, self.layout_.docks
+        chosen = PreferencesFeature(self, self.preferences, self.shortcuts, context.tasks, user_cache())
+        self.preferences_ = chosen
         self.palette_ = Palette(
-            self, settings, [lambda: menu_entries(self.menuBar(), self.actions_.reasons())]
+            self,
+            settings,
+            [lambda: menu_entries(self.menuBar(), self.actions_.reasons()), chosen.entries],
         )
         return [
             self,
@@ -141,9 +149,10 @@ class MainWindow(QMainWindow):
             self.appearance,
             self.layout_,
             self.palette_,
+            chosen,
             Choosing(context),
             ConsoleDoor(self.panels["console"], self.docks["console"]),
-            Help(self, context.host, self.viewing.mouse),
+            Help(self, context.host, self.shortcuts, self.viewing.mouse),
         ]
 
     def _panels(self) -> list[tuple[Panel, Qt.DockWidgetArea]]:
@@ -180,6 +189,8 @@ class MainWindow(QMainWindow):
         self.files.opened.connect(self._opened)
         self.tools.tool_changed.connect(lambda _: self.following.soon())
         self.following.start(self.actions_)
+        self.effects = Effects(self.preferences, self.context, self.files, self.quality, self.viewing)
+        self.preferences_.dress_numbers()
 
     def _opened(self) -> None:
         self.tools.entered = None
@@ -218,6 +229,9 @@ class MainWindow(QMainWindow):
         self.context.tasks.cancel()
         self.files.close()
         self.following.close()
+        self.effects.close()
+        self.appearance.close()
+        self.preferences.close()
         self.front.close()
         self.saved.close_panel()
         self.view_controls.close_panel()

@@ -60,6 +60,12 @@ class QualityControl(QWidget):
             with QSignalBlocker(self.slider):
                 self.slider.setValue(round(_STEPS * value))
 
+    def start_with(self, value: float) -> None:
+        """Where it stands in projects that say nothing of it."""
+        session, default = self._context.session, self._default()
+        if default is not None and NAME not in session.params and value != default:
+            session.shade_with(session.backend, {**session.params, NAME: value})
+
     def _default(self) -> float | None:
         context = self._context
         if not context.warm:

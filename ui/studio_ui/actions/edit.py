@@ -20,4 +20,8 @@ ITEMS: tuple[Item, ...] = (
                "All objects that share a material with what is chosen", enabled="objects"),
     ActionSpec("edit.select_instances", "Select instances", "Edit", "",
                "All objects that share a mesh with what is chosen", enabled="objects"),
+    SEPARATOR,
+    ActionSpec("edit.keys", "Keyboard shortcuts…", "Edit", "", "Change the keys of commands"),
+    ActionSpec("edit.preferences", "Preferences…", "Edit", "Ctrl+,",
+               "Theme, units, navigation, keys and more"),
 )  # fmt: skip

@@ -40,6 +40,8 @@ ITEMS: tuple[Item, ...] = (
                group="canvas", checked="canvas_gpu"),
     ActionSpec("view.canvas_software", "Software", "View/Canvas", "",
                "Draw the picture without the graphics card", group="canvas", checked="canvas_software"),
+    ActionSpec("view.system", "As the system", "View/Theme", "", "Dark or light, as the desktop is",
+               group="theme", checked="theme_system"),
     ActionSpec("view.dark", "Dark theme", "View/Theme", group="theme", checked="theme_dark"),
     ActionSpec("view.light", "Light theme", "View/Theme", group="theme", checked="theme_light"),
     SEPARATOR,

@@ -56,7 +56,6 @@ class KeysPage(QWidget):
         self.reset_all = _button("Reset all keys", "Every key as at the first start")
         self.told = QLabel()
         self.told.setWordWrap(True)
-        self.told.setProperty("role", "warning")
         self.clear.clicked.connect(lambda: self._give(""))
         self.back.clicked.connect(lambda: self._shortcuts.reset(self._chosen))
         self.take.clicked.connect(lambda: self._give(self._asked))
@@ -152,6 +151,9 @@ class KeysPage(QWidget):
 
     def _tell(self, text: str) -> None:
         self.told.setText(text)
+        self.told.setProperty("role", "warning" if self._chosen else "dim")
+        self.told.style().unpolish(self.told)
+        self.told.style().polish(self.told)
         self.take.setVisible(bool(self._asked))
 
     def _filter(self, text: str) -> None:
