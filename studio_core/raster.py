@@ -50,7 +50,7 @@ from studio_core.shading.frame import Frame
 from studio_core.shading.job import Job
 from studio_core.shading.kept import Kept
 from studio_core.shading.lamps import shown_environment
-from studio_core.shading.layers import NO_COLOUR, PIXELS, Layer, Part, averaged, parts_of
+from studio_core.shading.layers import EVERY, NO_COLOUR, PIXELS, Layer, Part, averaged, caught_hits, parts_of
 from studio_core.shading.pipeline import Inputs
 from studio_core.shading.primary import eye_in, visible_vertices
 
@@ -155,11 +155,40 @@ class Compositor:
         return Picture(radiance, linear, outline.coverage, outline.node, outline.distance, colours)
 
     def radiance(
-        self, scene: Scene, radiance: Radiance, hits: Hits, table: Coefficients, job: Job | None = None
+        self,
+        scene: Scene,
+        radiance: Radiance,
+        hits: Hits,
+        table: Coefficients,
+        job: Job | None = None,
+        samples: I64 = EVERY,
     ) -> F32:
-        """(N, 3) of single hits, as they are shown; 0 where nothing is hit. Nothing is looked through."""
+        """(N, 3) of single hits, as they are shown; 0 where nothing is hit. Nothing is looked through.
+
+        What catches shadows shows nothing unless it is known which `samples` (N,) of the picture they are.
+        """
         faces = self._faces(radiance.surfaces, hits.view, table.maps)
-        return self._hits(hits, faces, self._tables(scene, radiance, table, hits.view, job), job)
+        tables = self._tables(scene, radiance, table, hits.view, job)
+        out = self._hits(hits, faces, tables, job)
+        rows, photograph = self.photograph(scene, radiance.surfaces, hits, samples)
+        values = np.empty_like(photograph)
+        caught_light(0, len(rows), *_caught(hits, rows, faces, tables), photograph, values)
+        out[rows] = values
+        return out
+
+    def photograph(self, scene: Scene, surfaces: Surfaces, hits: Hits, samples: I64) -> tuple[I64, F32]:
+        """Which of some hits are caught, and the photograph (K, 3) that they show, without gain."""
+        rows, backdrop = caught_hits(hits, surfaces), self._backdrop.backdrop(scene)
+        if backdrop is None or not len(samples):
+            return EVERY, NO_COLOUR
+        return rows, self._backdrop.under(backdrop, hits, rows, samples[rows])
+
+    def photographed_light(self, scene: Scene, normals: F32) -> npt.NDArray[np.float64]:
+        """(N, 3) the irradiance that the photograph was taken in, at normals (N, 3)."""
+        environment = shown_environment(scene)
+        if environment is None:
+            return np.zeros(normals.shape)
+        return self._backdrop.before(environment, normals)
 
     def coefficients(self, surfaces: Surfaces, hits: Hits, table: Coefficients) -> F32:
         """(N, TERMS, 3) BRDF coefficients of hits on surfaces."""
@@ -195,7 +224,7 @@ class Compositor:
         """Adds what surfaces show that catch shadows: the photograph (N, 3) behind them, as it is lit."""
         hits, rows = layer.hits, layer.caught
         values = np.empty((len(rows), 3), np.float32)
-        given = (rows, hits.face, hits.u, hits.v, faces.shown, tables.record, photograph)
+        given = (*_caught(hits, rows, faces, tables), photograph)
 
         def catch(start: int, stop: int) -> None:
             caught_light(start, stop, *given, values)
@@ -282,6 +311,11 @@ class Compositor:
             coverage[hits.edges.pixels] = outline(hits.edges.hits)[0]
         shape = (view.height, view.width)
         return _Outline(coverage.reshape(shape), node.reshape(shape), distance.reshape(shape))
+
+
+def _caught(hits: Hits, rows: I64, faces: _Faces, tables: _Tables) -> tuple[I64, I32, F32, F32, U32, F32]:
+    """What `caught_light` asks of hits."""
+    return (rows, hits.face, hits.u, hits.v, faces.shown, tables.record)
 
 
 def _add_light(given: tuple[Any, ...], start: int, stop: int) -> None:

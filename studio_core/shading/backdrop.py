@@ -21,7 +21,7 @@ from studio_core.parallel import Workers
 from studio_core.scene.nodes import ON_THE_GROUND, Environment, Light, Scene
 from studio_core.scene.transform import rotation_matrix
 from studio_core.session import View
-from studio_core.shading.artifacts import Backdrop, Ground, Radiance
+from studio_core.shading.artifacts import Backdrop, Ground, Hits, Radiance
 from studio_core.shading.job import Job
 from studio_core.shading.kept import Kept
 from studio_core.shading.lamps import shown_environment
@@ -32,6 +32,7 @@ from studio_core.shading.primary import pinhole
 
 F32 = npt.NDArray[np.float32]
 F64 = npt.NDArray[np.float64]
+I64 = npt.NDArray[np.int64]
 WHITE = np.ones(3, np.float32)
 ROOM = 1.25  # of a dome around the eye
 
@@ -82,15 +83,20 @@ class BackdropPainter:
             place = part.of_picture(layer.samples)
             background_hits(0, len(values), lens, place, layer.hits.face, *sky, backdrop.gain, values)
             add_samples(layer.samples, layer.hits.samples**2, layer.weight, values, out)
-        caught = []
-        for layer in layers:
-            values = np.empty((len(layer.caught), 3), np.float32)
-            if len(values):
-                place, away = part.of_picture(layer.caught_samples), layer.hits.distance[layer.caught]
-                given = (lens, place, away, *sky, WHITE, values)
-                self._workers.run(len(values), PIXELS, partial(_look_at, given), job)
-            caught.append(values)
+        caught = [
+            self.under(backdrop, layer.hits, layer.caught, part.of_picture(layer.caught_samples), job)
+            for layer in layers
+        ]
         return Behind(out, tuple(caught))
+
+    def under(self, backdrop: Backdrop, hits: Hits, rows: I64, samples: I64, job: Job | None = None) -> F32:
+        """(N, 3) the photograph, without gain, that some hits (N,) meet, which are samples of the picture."""
+        values = np.empty((len(rows), 3), np.float32)
+        if len(rows):
+            sky = (*way_into(backdrop, hits.view), backdrop.pixels, WHITE)
+            given = (pinhole(hits.view), samples, hits.distance[rows], *sky, values)
+            self._workers.run(len(rows), PIXELS, partial(_look_at, given), job)
+        return values
 
     def light(self, scene: Scene, radiance: Radiance, record: F32) -> None:
         """What catches shadows is black by itself; record[:, 3:6] becomes what the photograph is multiplied
@@ -103,13 +109,17 @@ class BackdropPainter:
         environment = shown_environment(scene)
         if environment is None or not environment.background:
             return
-        pixels = self._pixels(environment)
-        open_light = self._open(lambda: OpenLight(pixels), pixels)
-        before = open_light.irradiance(mesh.normals[rows] @ environment.rotation().matrix()[:3, :3])
+        before = self.before(environment, mesh.normals[rows])
         lights = {node.id: node for node in scene.of(Light) if scene.shown(node.id)}
         now = radiance.irradiance(lights)[rows]
         ratio = np.divide(now, before, out=np.zeros(now.shape), where=before > 0)
         record[rows, 3:6] = np.where(radiance.valid[rows, None], ratio, environment.gain())
+
+    def before(self, environment: Environment, normals: F32) -> F64:
+        """(N, 3) irradiance at unit gain of places where nothing stands, with normals (N, 3) in the world."""
+        pixels = self._pixels(environment)
+        light = self._open(lambda: OpenLight(pixels), pixels)
+        return light.irradiance(normals @ environment.rotation().matrix()[:3, :3])
 
     def _pixels(self, environment: Environment) -> F32:
         return self._sky(lambda: readonly(linear_rgb(environment.image), np.float32), environment.image)

@@ -74,8 +74,6 @@ class ErrorMeter:
     ) -> MeasuredError | None:
         """Errors of the pipeline's radiance for `frame`; None where nothing opaque is seen.
 
-        Nor is what catches shadows looked at: it shows a photograph.
-
         Layers that brute force does not make (light that came by way of other surfaces) are left out on
         both sides. With more `places` the errors are surer: their standard error says how sure.
         """
@@ -92,8 +90,7 @@ class ErrorMeter:
         rng = np.random.default_rng(frame.revision)
         surfaces, mesh = radiance.surfaces, radiance.surfaces.mesh
         hit = np.flatnonzero(hits.face >= 0)
-        plain = (surfaces.opacity >= 1) & ~surfaces.catches
-        candidates = hit[plain[mesh.face_material[hits.face[hit]]]]
+        candidates = hit[surfaces.opacity[mesh.face_material[hits.face[hit]]] >= 1]
         if not len(candidates):
             return None
         chosen = np.sort(rng.choice(candidates, min(places, len(candidates)), replace=False))
@@ -102,14 +99,18 @@ class ErrorMeter:
         points = surface_points(surfaces, seen, frame)
         truth = self._brute(points, shapes, lighting, casters, frame, job)
         looks, lights = self._compositor.coefficients(surfaces, seen, table), _lights(frame)
+        caught, photograph = self._compositor.photograph(frame.scene, surfaces, seen, chosen)
+        before = self._compositor.photographed_light(frame.scene, points.normals[caught])
+        albedo = np.divide(photograph, before, out=np.zeros(before.shape), where=before > 0)
         shown_layers, true_layers = {}, {}
         for layer in radiance.layers:
             one = dataclasses.replace(radiance, layers={layer: radiance.layers[layer]})
-            shown_layers[layer] = self._compositor.radiance(frame.scene, one, seen, table, job)
+            shown_layers[layer] = self._compositor.radiance(frame.scene, one, seen, table, job, chosen)
             lit = dataclasses.replace(
                 radiance, layers={layer: truth[layer]}, valid=np.ones(len(chosen), np.bool_)
             )
             true_layers[layer] = (lit.combined(lights) * looks).sum(axis=1)
+            true_layers[layer][caught] = lit.irradiance(lights)[caught] * albedo
         dark = np.zeros((len(chosen), 3), np.float32)
         shown, true = sum(shown_layers.values(), dark), sum(true_layers.values(), dark)
         by_layer = {k: compare(shown_layers[k], true_layers[k]) for k in shown_layers}

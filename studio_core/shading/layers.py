@@ -71,17 +71,13 @@ def parts_of(hits: Hits, surfaces: Surfaces) -> tuple[Part, ...]:
 def _layers(hits: Hits, surfaces: Surfaces) -> tuple[Layer, ...]:
     """The hits and what is seen through them, each with what the surfaces before it let through."""
     made: list[Layer] = []
-    materials, catches = surfaces.mesh.face_material, surfaces.catches
+    materials = surfaces.mesh.face_material
 
     def add(layer: Hits, samples: I64, arrives: F32) -> None:
         weight = arrives.copy()
         if layer.behind and not len(weight):
             weight = np.ones(len(layer.face), np.float32)
-        caught = EVERY
-        if catches.any():
-            met = np.flatnonzero(layer.face >= 0)
-            caught = met[catches[materials[layer.face[met]]]]
-        made.append(Layer(layer, samples, weight, caught))
+        made.append(Layer(layer, samples, weight, caught_hits(layer, surfaces)))
         for index, rest in layer.behind:
             alpha = surfaces.opacity[materials[layer.face[index]]]
             passed = weight[index] * (1 - alpha)
@@ -90,6 +86,14 @@ def _layers(hits: Hits, surfaces: Surfaces) -> tuple[Layer, ...]:
 
     add(hits, EVERY, _FULLY)
     return tuple(made)
+
+
+def caught_hits(hits: Hits, surfaces: Surfaces) -> I64:
+    """Which hits meet what catches shadows."""
+    if not surfaces.catches.any():
+        return EVERY
+    met = np.flatnonzero(hits.face >= 0)
+    return np.asarray(met[surfaces.catches[surfaces.mesh.face_material[hits.face[met]]]])
 
 
 def averaged(

@@ -12,7 +12,6 @@ from studio_core.contract import Services
 from studio_core.scene.nodes import Environment, PointLamp, Scene
 from studio_core.scene.transform import Transform, looking
 from studio_core.session import View
-from studio_core.shading.artifacts import Surfaces
 from studio_core.shading.offline import backend_params, measured_picture, picture
 
 ABOVE = View(looking((0.01, 5, 0), (0, 0, 0)), 60, 48, 48, antialias=1)
@@ -103,12 +102,18 @@ def test_cuts_show_what_the_reference_shows(draw):
     assert np.sqrt(((made.linear - exact.linear) ** 2).mean()) < 0.04 * exact.linear.mean()
 
 
-def test_errors_are_measured_on_the_furniture(host, workers):
+@pytest.mark.parametrize("directions", ["4096", "32768"])
+def test_errors_are_measured_on_the_photograph_too(host, workers, directions):
+    """As good as the furniture's, and where nothing stands there is none."""
     backend = host.get("backend", "reference")
-    given = backend_params(backend, {"directions": "1024", "vertices": 1000})
+    given = backend_params(backend, {"directions": directions, "vertices": 4000})
     services = Services(workers, host)
-    made, error = measured_picture(photographed(), ABOVE, backend, given, services, 32)
+    lamp = PointLamp(id="lamp", name="Lamp", transform=Transform((1, 2, 0.5)), intensity=2.0)
+    for fields in ({}, {"projection": "on the ground", "tint": (1.0, 0.5, 2.0)}):
+        scene = photographed(**fields).with_nodes(lamp)
+        _, error = measured_picture(scene, ABOVE, backend, given, services, 256)
+        assert error is not None
+        assert 0.001 < error.picture.relative_rmse < 0.12
+    _, error = measured_picture(without_cube(photographed()), ABOVE, backend, given, services, 64)
     assert error is not None
-    assert isinstance(made.radiance.surfaces, Surfaces)
-    only_floor = without_cube(photographed())
-    assert measured_picture(only_floor, ABOVE, backend, given, services, 32)[1] is None
+    assert error.picture.relative_rmse < 0.01
