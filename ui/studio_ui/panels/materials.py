@@ -152,7 +152,7 @@ class MaterialsPanel(Panel):
             self._built = key
             self._build(material, model)
         if material is not None and self.common is not None:
-            self.common.show_values({"name": material.name, "opacity": material.opacity})
+            self.common.show_values({name: getattr(material, name) for name in _COMMON})
             if self.form is not None and model is not None:
                 self.form.show_values({**defaults(model.Params), **material.values})
 
@@ -229,6 +229,9 @@ class MaterialsPanel(Panel):
             return SetMaterial(self.material, name=str(value), label="Rename material")
         if name == "opacity":
             return SetMaterial(self.material, opacity=float(value), label=f"Opacity of {material.name}")  # type: ignore[arg-type]
+        if name == "catches":
+            what = "catches shadows" if value else "is an ordinary surface"
+            return SetMaterial(self.material, catches=bool(value), label=f"{material.name} {what}")
         model = self._brdf(material.model)
         info = param_infos(model.Params).get(name) if model is not None else None
         label = f"{info.label if info else name} of {material.name}"
