@@ -126,12 +126,12 @@ class Environment(Light):
     tilt: float = param(0.0, "Tilt", "Tips the light about the horizontal", unit="°", low=-180.0, high=180.0)
     background: bool = param(True, "Visible", "Shown behind the furniture")
     background_azimuth: float = param(
-        0.0, "Background turned", "Turns what is seen, not the light", unit="°", low=-3600.0, high=3600.0
+        0.0, "Turned", "Turns the background alone, not the light", unit="°", low=-3600.0, high=3600.0
     )
     projection: str = param(
         FAR_AWAY,
-        "Background",
-        "Far away it never comes nearer; on the ground, furniture stands in it",
+        "Projection",
+        "Far away the background never comes nearer; on the ground, furniture stands in it",
         choices=(FAR_AWAY, ON_THE_GROUND),
     )
     ground_height: float = param(
