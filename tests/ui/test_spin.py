@@ -69,8 +69,8 @@ def shown(qtbot: QtBot, spin: QWidget, style: NumberStyle | None = None) -> QWid
     QFormLayout(window).addRow(spin)
     if style is not None:
         set_number_style(window, style)
-    window.show()
-    qtbot.waitExposed(window)
+    with qtbot.waitExposed(window):
+        window.show()
     return window
 
 

@@ -23,7 +23,6 @@ from studio_ui.actions.catalogue import ACTIONS, specs
 from studio_ui.dialogs import KeysDialog, PluginsDialog
 from studio_ui.feed import REST_MS
 from studio_ui.icons import ICONS, icon
-from studio_ui.theme import THEMES
 
 HEAVY = ("numba", "trimesh", "OpenImageIO", "cv2", "scipy", "embreex", "vispy", "pyqtgraph", "PIL", "mitsuba")
 
@@ -173,28 +172,6 @@ def test_dialogs_show_what_they_are_for(make: Make) -> None:
 def test_icons_have_strokes(name: str, qapp: QApplication) -> None:
     image = icon(name, "#ffffff").pixmap(24, 24).toImage()
     assert any(image.pixelColor(x, y).alpha() > 128 for x in range(24) for y in range(24))
-
-
-@pytest.mark.parametrize("name", sorted(THEMES))
-def test_text_can_be_read_on_every_ground(name: str) -> None:
-    """WCAG contrast: 4.5 for text, 3 for dimmed text."""
-    from studio_core.params import parse_colour
-
-    theme = THEMES[name]
-
-    def light(colour: str) -> float:
-        red, green, blue = parse_colour("colour", colour)
-        return 0.2126 * red + 0.7152 * green + 0.0722 * blue
-
-    def contrast(a: str, b: str) -> float:
-        bright, dark = sorted((light(a), light(b)), reverse=True)
-        return (bright + 0.05) / (dark + 0.05)
-
-    for ground in (theme.window, theme.base, theme.raised):
-        assert contrast(theme.text, ground) >= 4.5
-        assert contrast(theme.dim, ground) >= 3
-        assert contrast(theme.problem, ground) >= 3
-    assert contrast(theme.on_accent, theme.accent) >= 3
 
 
 def test_help_and_lists_open(driver: Driver) -> None:

@@ -129,7 +129,9 @@ class MainWindow(QMainWindow):
         self.appearance = Appearance(self.preferences, viewport, self.canvas)
         self.layout_ = Layout(self, settings, self._panels())
         self.panels, self.docks = self.layout_.panels, self.layout_.docks
-        chosen = PreferencesFeature(self, self.preferences, self.shortcuts, context.tasks, user_cache())
+        chosen = PreferencesFeature(
+            self, self.preferences, self.shortcuts, context.tasks, user_cache() / "computed"
+        )
         self.preferences_ = chosen
         self.palette_ = Palette(
             self,

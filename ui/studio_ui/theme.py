@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 from string import Template
 
 from PySide6.QtGui import QColor, QPalette
@@ -14,7 +15,10 @@ PANEL_WIDTH = 300
 
 @dataclass(frozen=True)
 class Theme:
-    """Named colours; `canvas` surrounds the picture."""
+    """Named colours.
+
+    `border` parts areas, `edge` shows where a control ends, `canvas` surrounds the picture.
+    """
 
     name: str
     window: str
@@ -23,6 +27,7 @@ class Theme:
     border: str
     text: str
     dim: str
+    edge: str
     accent: str
     on_accent: str
     canvas: str
@@ -37,12 +42,13 @@ DARK = Theme(
     raised="#3a3a3c",
     border="#19191a",
     text="#dededd",
-    dim="#9b9b99",
+    dim="#a6a6a4",
+    edge="#7b7b79",
     accent="#e0a24a",
     on_accent="#1d1a15",
     canvas="#191919",
     warning="#e8c15a",
-    problem="#f0806c",
+    problem="#f58d7a",
 )
 LIGHT = Theme(
     name="light",
@@ -51,15 +57,17 @@ LIGHT = Theme(
     raised="#ffffff",
     border="#c9c9c6",
     text="#242423",
-    dim="#6d6d6a",
-    accent="#b06f12",
+    dim="#5f5f5c",
+    edge="#848481",
+    accent="#9c610d",
     on_accent="#ffffff",
     canvas="#c4c4c2",
-    warning="#8a6500",
+    warning="#7f5c00",
     problem="#b3351f",
 )
 THEMES = {theme.name: theme for theme in (DARK, LIGHT)}
 
+_ASSETS = Path(__file__).parent / "assets"
 _SHEET = Template("""
 QToolTip { background: $raised; color: $text; border: 1px solid $border; padding: 3px 5px; }
 QMainWindow::separator { background: $border; width: 3px; height: 3px; }
@@ -71,12 +79,15 @@ QMenu { background: $raised; border: 1px solid $border; padding: 4px; }
 QMenu::item { padding: 5px 26px 5px 24px; border-radius: 3px; }
 QMenu::item:selected { background: $accent; color: $on_accent; }
 QMenu::item:disabled { color: $dim; }
+QMenu::indicator { width: 14px; height: 14px; left: 5px; }
+QMenu::indicator:checked { image: url("$assets/tick-$name.svg"); }
 QMenu::separator { height: 1px; background: $border; margin: 4px 6px; }
 QToolBar { background: $window; border: none; border-bottom: 1px solid $border; padding: 3px 6px;
     spacing: 2px; }
 QToolBar::separator { width: 1px; background: $border; margin: 4px 5px; }
 QToolButton { border: 1px solid transparent; border-radius: 4px; padding: 4px; }
 QToolButton:hover { background: $raised; }
+QToolButton:focus { border-color: $accent; }
 QToolButton:pressed, QToolButton:checked { background: $accent; color: $on_accent; }
 QToolButton::menu-indicator { image: none; }
 QToolButton[role="small"] { padding: 1px; }
@@ -88,47 +99,64 @@ QTabBar::tab { background: transparent; color: $dim; padding: 5px 8px; border: n
                border-bottom: 2px solid transparent; }
 QTabBar::tab:selected { color: $text; border-bottom-color: $accent; }
 QTabBar::tab:hover { color: $text; }
+QTabBar::tab:selected:focus { background: $raised; }
 QStatusBar { background: $window; border-top: 1px solid $border; color: $dim; }
 QStatusBar::item { border: none; }
 QStatusBar QLabel { color: $dim; padding: 0 6px; }
 QTreeView, QListView, QTableView, QPlainTextEdit { background: $base; border: 1px solid $border;
     border-radius: 4px; outline: 0; selection-background-color: $accent; selection-color: $on_accent; }
+QTreeView:focus, QListView:focus, QTableView:focus, QPlainTextEdit:focus { border-color: $accent; }
 QTreeView::item, QListView::item { padding: 3px 2px; }
 QTreeView::item:hover, QListView::item:hover { background: $raised; }
 QTreeView::item:selected, QListView::item:selected { background: $accent; color: $on_accent; }
 QHeaderView::section { background: $window; color: $dim; border: none; padding: 4px 6px; }
-QLineEdit, QSpinBox, QDoubleSpinBox, QComboBox { background: $base; border: 1px solid $border;
+QLineEdit, QSpinBox, QDoubleSpinBox, QComboBox { background: $base; border: 1px solid $edge;
     border-radius: 4px; padding: 3px 6px; min-height: 18px; selection-background-color: $accent;
     selection-color: $on_accent; }
 QLineEdit:focus, QSpinBox:focus, QDoubleSpinBox:focus, QComboBox:focus { border-color: $accent; }
-QLineEdit:disabled, QSpinBox:disabled, QDoubleSpinBox:disabled, QComboBox:disabled { color: $dim; }
+QLineEdit:disabled, QSpinBox:disabled, QDoubleSpinBox:disabled, QComboBox:disabled { color: $dim;
+    border-color: $border; }
+QComboBox::drop-down { border: none; width: 18px; }
+QComboBox::down-arrow { image: url("$assets/down-$name.svg"); width: 10px; height: 10px; }
 QAbstractSpinBox QLineEdit, QComboBox QLineEdit { border: none; padding: 0 5px; min-height: 0; margin: 0;
     background: transparent; }
 QSpinBox::up-button, QSpinBox::down-button, QDoubleSpinBox::up-button, QDoubleSpinBox::down-button {
     width: 0; height: 0; border: none; }
-QCheckBox::indicator { width: 14px; height: 14px; border: 1px solid $dim; border-radius: 3px;
+QCheckBox::indicator, QTreeView::indicator, QListView::indicator { width: 14px; height: 14px;
+    border: 1px solid $edge; border-radius: 3px; background: $base; }
+QCheckBox::indicator:checked, QTreeView::indicator:checked, QListView::indicator:checked {
+    background: $accent; border-color: $accent; image: url("$assets/check-$name.svg"); }
+QCheckBox::indicator:indeterminate, QTreeView::indicator:indeterminate { background: $accent;
+    border-color: $accent; image: url("$assets/partly-$name.svg"); }
+QCheckBox::indicator:disabled { border-color: $border; }
+QCheckBox::indicator:focus, QRadioButton::indicator:focus { border: 2px solid $text; width: 12px;
+    height: 12px; }
+QRadioButton::indicator { width: 14px; height: 14px; border: 1px solid $edge; border-radius: 8px;
     background: $base; }
-QCheckBox::indicator:checked { background: $accent; border-color: $accent; }
-QCheckBox::indicator:indeterminate { background: $dim; }
-QTreeView::indicator { width: 12px; height: 12px; border: 1px solid $dim; border-radius: 3px;
-    background: $base; }
-QTreeView::indicator:checked { background: $accent; border-color: $text; }
+QRadioButton::indicator:checked { width: 6px; height: 6px; border: 5px solid $accent;
+    background: $on_accent; }
+QTreeView::indicator, QListView::indicator { width: 12px; height: 12px; }
+QTreeView::indicator:checked, QListView::indicator:checked { border-color: $text; }
 QComboBox QAbstractItemView { background: $raised; border: 1px solid $border; outline: 0; }
-QPushButton { background: $raised; border: 1px solid $border; border-radius: 4px; padding: 5px 12px; }
+QPushButton { background: $raised; border: 1px solid $edge; border-radius: 4px; padding: 5px 12px; }
 QPushButton:hover { border-color: $accent; }
 QPushButton:pressed, QPushButton:checked { background: $accent; color: $on_accent; }
 QPushButton:default { border-color: $accent; }
-QPushButton:disabled { color: $dim; }
+QPushButton:focus { border: 2px solid $accent; padding: 4px 11px; }
+QPushButton:disabled { color: $dim; border-color: $border; }
+QDialogButtonBox { dialogbuttonbox-buttons-have-icons: 0; }
 QProgressBar { background: $base; border: 1px solid $border; border-radius: 3px; max-height: 8px; }
 QProgressBar::chunk { background: $accent; border-radius: 2px; }
 QSlider::groove:horizontal { height: 4px; background: $base; border: 1px solid $border; border-radius: 2px; }
 QSlider::sub-page:horizontal { background: $accent; border-radius: 2px; }
+QSlider { border: 1px solid transparent; border-radius: 4px; }
+QSlider:focus { border-color: $accent; }
 QSlider::handle:horizontal { width: 11px; margin: -5px 0; border-radius: 6px; background: $text; }
 QSlider::sub-page:horizontal:disabled, QSlider::handle:horizontal:disabled { background: $dim; }
 QScrollArea { border: none; background: transparent; }
 QScrollBar:vertical { width: 10px; background: transparent; margin: 0; }
 QScrollBar:horizontal { height: 10px; background: transparent; margin: 0; }
-QScrollBar::handle { background: $raised; border-radius: 4px; min-height: 24px; min-width: 24px;
+QScrollBar::handle { background: $edge; border-radius: 4px; min-height: 24px; min-width: 24px;
     margin: 1px; }
 QScrollBar::add-line, QScrollBar::sub-line { width: 0; height: 0; }
 QScrollBar::add-page, QScrollBar::sub-page { background: transparent; }
@@ -179,7 +207,7 @@ def palette(theme: Theme) -> QPalette:
 
 def wear(application: QApplication, theme: Theme) -> None:
     """Dress the whole application; nothing happens when it wears the theme already."""
-    sheet = _SHEET.substitute(vars(theme))
+    sheet = _SHEET.substitute(vars(theme), assets=_ASSETS.as_posix())
     if application.styleSheet() != sheet:
         application.setStyle("Fusion")
         application.setPalette(palette(theme))
