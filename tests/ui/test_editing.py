@@ -74,9 +74,9 @@ def test_another_kind_of_material_has_its_own_form(driver: Driver) -> None:
     panel = driver.window.panels["materials"]
     panel.choose("blue")
     assert "roughness" not in panel.form.fields
-    index = panel._models.index("ggx")
-    panel._model_combo.setCurrentIndex(index)
-    panel._model_combo.activated.emit(index)
+    index = panel.editor.kinds.index("ggx")
+    panel.editor.kind.setCurrentIndex(index)
+    panel.editor.kind.activated.emit(index)
     driver.until(lambda: "roughness" in panel.form.fields)
     assert driver.document.scene.material("blue").model == "ggx"
     names = set(param_infos(driver.context.host.brdf("ggx").Params))
@@ -126,7 +126,7 @@ def test_showing_values_is_no_edit(driver: Driver) -> None:
         AddMaterial(Material(id="odd", name="Odd", model="ggx", values={"roughness": 0.123456789}))
     )
     panel = driver.window.panels["materials"]
-    driver.until(lambda: "odd" in panel._items)
+    driver.until(lambda: "odd" in panel.list.rows)
     panel.choose("odd")
     spin = panel.form.fields["roughness"].spin
     spin.setFocus()

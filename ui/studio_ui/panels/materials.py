@@ -1,32 +1,27 @@
-"""Materials: the list, and the chosen one's model, parameters and pictures."""
+"""Materials: the list, what is done with them, and what the chosen ones are like."""
 
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
-from PySide6.QtCore import QSignalBlocker, QSize, QTimer
-from PySide6.QtWidgets import QFileDialog, QLabel, QListWidget, QListWidgetItem, QPushButton, QWidget
+from PySide6.QtCore import QPoint, Qt, QTimer
+from PySide6.QtWidgets import QMenu, QPushButton, QSplitter, QToolButton, QWidget
 
-from studio_core.contract import Brdf
-from studio_core.edits import AddMaterial, Assign, Compound, Edit, RemoveMaterial, SetMaterial, SetTexture
-from studio_core.errors import PluginError
-from studio_core.params import ParamInfo, Value, defaults, param_infos
-from studio_core.scene.diff import Changes
-from studio_core.scene.geometry import Image, Texture
+from studio_core.edits import AddMaterial, Compound, RemoveMaterial, SetMaterial
+from studio_core.scene.diff import Aspect, Changes
 from studio_core.scene.nodes import Material, MaterialId, MeshObject, Scene, new_id
-from studio_core.shading.job import Job
+from studio_ui.choosing import meshes_below, users
 from studio_ui.context import Context
 from studio_ui.fields import Combo
-from studio_ui.panels.panel import Panel, clear, note, row
-from studio_ui.panels.swatch import SIZE, swatch
-from studio_ui.param_form import ParamForm, form_label, form_layout
-from studio_ui.sinks import EditSink
+from studio_ui.material_drag import assigned
+from studio_ui.panels.material_form import MaterialForm
+from studio_ui.panels.material_list import MaterialList, users_of
+from studio_ui.panels.panel import Panel, row
+from studio_ui.param_form import ParamForm
+from studio_ui.theme import Theme
 
-_COMMON: Mapping[str, ParamInfo] = param_infos(Material)
-PICTURES = "Pictures (*.png *.jpg *.jpeg *.exr *.hdr *.tif *.tiff)"
+_WHAT_CHANGES_USERS = Aspect.STRUCTURE | Aspect.MATERIAL
 
 
 class MaterialsPanel(Panel):
@@ -37,31 +32,38 @@ class MaterialsPanel(Panel):
 
     def __init__(self, context: Context) -> None:
         super().__init__(context)
-        self.material: MaterialId | None = None
-        self._sink = EditSink(context.editing, self._make, lambda name: self._make(name, 0.0).label)
-        self.form: ParamForm | None = None
-        self.common: ParamForm | None = None
-        self.list = QListWidget()
-        self.list.setIconSize(QSize(SIZE, SIZE))
-        self.list.setUniformItemSizes(True)
-        self.list.setMaximumHeight(210)
-        self.list.currentItemChanged.connect(lambda item, _: self._chosen(item))
-        add, copy = self.tool("add", "New material"), self.tool("duplicate", "Duplicate the material")
-        remove = self.tool("delete", "Delete the material, if nothing uses it")
-        self.users = self.tool("select", "Choose the objects that have this material")
-        self.assign = QPushButton("Assign to selection")
+        self.chosen: tuple[MaterialId, ...] = ()
+        self.list = MaterialList()
+        self.list.chosen = self._chosen
+        self.list.renamed = self._rename
+        self.list.customContextMenuRequested.connect(self._menu)
+        self.editor = MaterialForm(context, self.tool)
+        add = self.tool("add", "New material")
+        copy = self.tool("duplicate", "Duplicate the chosen material")
+        self.users = self.tool("select", "Choose the objects that have the chosen materials")
         add.clicked.connect(self.add)
         copy.clicked.connect(self.copy)
-        remove.clicked.connect(self.remove)
         self.users.clicked.connect(self.select_users)
+        self.assign = QPushButton("Assign")
+        self.assign.setToolTip("Give the chosen objects this material; or drag it onto an object")
         self.assign.clicked.connect(self.assign_to_selection)
-        self.column.addWidget(self.list)
-        self.column.addLayout(row(add, copy, remove, self.users, self.assign, stretch=4))
-        self._column = self.scroller()
-        self._model_combo = Combo()
-        self._models: list[str] = []
-        self._items: dict[MaterialId, Material] = {}
-        self._built: tuple[Any, ...] = ()
+        self.slot = Combo()
+        self.slot.setAccessibleName("Slot")
+        self.slot.setToolTip("Which slot of the chosen object")
+        self.slot.setMinimumContentsLength(5)
+        top = QWidget()
+        above = self.column_of(top)
+        above.addWidget(self.list, 1)
+        above.addLayout(row(add, copy, self._delete_button(), self.users, self.assign, self.slot, stretch=4))
+        below = QWidget()
+        self.scroller(self.column_of(below)).addWidget(self.editor)
+        split = QSplitter(Qt.Orientation.Vertical)
+        split.setChildrenCollapsible(False)
+        split.addWidget(top)
+        split.addWidget(below)
+        split.setSizes([240, 400])
+        split.setStretchFactor(1, 1)
+        self.column.addWidget(split)
         self._soon = QTimer(self)
         self._soon.setSingleShot(True)
         self._soon.timeout.connect(self.refresh)
@@ -72,182 +74,94 @@ class MaterialsPanel(Panel):
         )
         self.refresh()
 
-    # list
+    def _delete_button(self) -> QToolButton:
+        made = self.tool("delete", "Delete materials")
+        menu = QMenu(made)
+        menu.addAction("Delete the chosen materials", self.remove)
+        menu.addAction("Delete all that no object has", self.remove_unused)
+        made.setMenu(menu)
+        made.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
+        return made
+
+    @property
+    def material(self) -> MaterialId | None:
+        """The one that was chosen last."""
+        return self.chosen[-1] if self.chosen else None
+
+    @property
+    def form(self) -> ParamForm | None:
+        """The parameters of the chosen materials' model."""
+        return self.editor.form
+
+    @property
+    def common(self) -> ParamForm | None:
+        """What all materials have."""
+        return self.editor.common
+
+    def set_theme(self, theme: Theme) -> None:
+        """Other colours."""
+        super().set_theme(theme)
+        self.list.set_theme(theme)
+        self.refresh()
+
+    # the list
 
     def refresh(self) -> None:
         """Show the scene's materials as they are now."""
-        materials = self.context.document.scene.materials
-        with QSignalBlocker(self.list):
-            if list(self._items) != list(materials):
-                self.list.clear()
-                for material in materials.values():
-                    item = QListWidgetItem(swatch(material, self.devicePixelRatioF()), material.name)
-                    item.setData(256, material.id)
-                    self.list.addItem(item)
-            else:
-                for index, material in enumerate(materials.values()):
-                    if self._items[material.id] is not material:
-                        self.list.item(index).setText(material.name)
-                        self.list.item(index).setIcon(swatch(material, self.devicePixelRatioF()))
-            self._items = dict(materials)
-            if self.material not in materials:
-                self.material = next(iter(materials), None)
-            if self.material is not None:
-                self.list.setCurrentRow(list(materials).index(self.material))
-        self._selection_changed()
-        self._show()
+        self._soon.stop()
+        scene = self.context.document.scene
+        self.list.show_scene(scene)
+        self.chosen = tuple(m for m in self.chosen if m in scene.materials)
+        if not self.chosen:
+            self.chosen = tuple(scene.materials)[:1]
+        if set(self.list.selected) != set(self.chosen):
+            self.list.select_materials(self.chosen)
+        self._offer_slots()
+        self.editor.show_materials(self.chosen)
 
     def choose(self, material: MaterialId) -> None:
         """Show that material."""
-        if material in self._items:
-            self.list.setCurrentRow(list(self._items).index(material))
+        if material in self.context.document.scene.materials:
+            self.chosen = (material,)
+            self.refresh()
+
+    def load_picture(self, name: str, path: Path) -> None:
+        """A picture for a parameter of the chosen material."""
+        self.editor.load_picture(name, path)
+
+    def _chosen(self, materials: tuple[MaterialId, ...]) -> None:
+        if materials:
+            self.chosen = materials
+            self.editor.show_materials(materials)
+            self._offer_slots()
 
     def _edited(self, before: Scene, after: Scene, changes: Changes) -> None:
-        if changes.materials or before.materials.keys() != after.materials.keys():
+        if changes.materials or changes.aspects & _WHAT_CHANGES_USERS:
             self._soon.start(0)
 
     def _selected(self) -> None:
+        meshes = self._meshes()
+        if meshes and not any(m in meshes[0].materials for m in self.chosen) and meshes[0].materials:
+            self.choose(meshes[0].materials[0])
+        self._offer_slots()
+
+    def _meshes(self) -> tuple[MeshObject, ...]:
+        return meshes_below(self.context.document.scene, self.context.session.selection)
+
+    def _offer_slots(self) -> None:
+        """Where a material can go to: slots are asked for only where there are several."""
+        meshes = self._meshes()
+        self.assign.setEnabled(bool(self.chosen and meshes))
+        slots = meshes[0].materials if len(meshes) == 1 else ()
         scene = self.context.document.scene
-        for chosen in self.context.session.selection:
-            for below in scene.subtree(chosen) if chosen in scene.nodes else ():
-                node = scene[below]
-                if isinstance(node, MeshObject) and node.materials:
-                    if self.material not in node.materials:
-                        self.choose(node.materials[0])
-                    self._selection_changed()
-                    return
-        self._selection_changed()
+        names = [f"{i}: {scene.material(m).name}" for i, m in enumerate(slots, 1)]
+        names = ["All slots", *names] if len(slots) > 1 else []
+        if names != [self.slot.itemText(i) for i in range(self.slot.count())]:
+            self.slot.clear()
+            self.slot.addItems(names)
+        self.slot.setVisible(bool(names))
 
-    def _selection_changed(self) -> None:
-        self.assign.setEnabled(self.material is not None and bool(self._selected_meshes()))
-
-    def _selected_meshes(self) -> list[MeshObject]:
-        scene = self.context.document.scene
-        found = {
-            below: scene[below]
-            for chosen in self.context.session.selection
-            if chosen in scene.nodes
-            for below in scene.subtree(chosen)
-        }
-        return [node for node in found.values() if isinstance(node, MeshObject)]
-
-    def _chosen(self, item: QListWidgetItem | None) -> None:
-        self.material = item.data(256) if item is not None else None
-        self._selection_changed()
-        self._show()
-
-    # the chosen one
-
-    def _show(self) -> None:
-        scene = self.context.document.scene
-        material = scene.materials.get(self.material) if self.material is not None else None
-        model = self._brdf(material.model) if material is not None else None
-        key = (
-            self.material,
-            material.model if material else None,
-            model is not None,
-            tuple(material.textures.items()) if material else (),
-        )
-        if key != self._built:
-            self._built = key
-            self._build(material, model)
-        if material is not None and self.common is not None:
-            self.common.show_values({name: getattr(material, name) for name in _COMMON})
-            if self.form is not None and model is not None:
-                self.form.show_values({**defaults(model.Params), **material.values})
-
-    def _brdf(self, name: str) -> Brdf | None:
-        if not self.context.warm:
-            return None
-        try:
-            return self.context.host.brdf(name)
-        except PluginError:
-            return None
-
-    def _build(self, material: Material | None, model: Brdf | None) -> None:
-        self._sink.commit()  # a slider that is held goes with its form
-        clear(self._column)
-        self.form = self.common = None
-        if material is None:
-            self._column.addWidget(note("The scene has no materials yet."))
-            self._column.addStretch(1)
-            return
-        self.common = ParamForm(_COMMON, self._sink)
-        self._column.addWidget(self.common)
-        box = QWidget()
-        layout = form_layout(box)
-        self._model_combo = Combo()
-        self._models = list(self.context.host.names("brdf"))
-        if material.model not in self._models:
-            self._models.append(material.model)
-        for name in self._models:
-            brdf = self._brdf(name)
-            self._model_combo.addItem(brdf.label if brdf is not None else name, name)
-        self._model_combo.setCurrentIndex(self._models.index(material.model))
-        self._model_combo.setEnabled(self.context.warm)
-        self._model_combo.activated.connect(lambda i: self._change_model(self._models[i]))
-        layout.addRow(form_label("Kind", "How the surface reflects light"), self._model_combo)
-        self._column.addWidget(box)
-        if model is not None:
-            self.form = ParamForm(param_infos(model.Params), self._sink)
-            self._column.addWidget(self.form)
-            for name in model.textures:
-                self._column.addWidget(
-                    self._texture_row(material, name, param_infos(model.Params)[name].label)
-                )
-        elif self.context.warm:
-            self._column.addWidget(note(f"The kind {material.model!r} is not installed: see Help ▸ Plugins."))
-        else:
-            self._column.addWidget(note("Loading…"))
-        self._column.addStretch(1)
-
-    def _texture_row(self, material: Material, name: str, label: str) -> QWidget:
-        box = QWidget()
-        layout = form_layout(box)
-        texture = material.textures.get(name)
-        text = QLabel("none")
-        text.setProperty("role", "dim")
-        if texture is not None:
-            height, width = texture.image.pixels.shape[:2]
-            text.setText(f"{width} × {height}")
-        load = self.tool("open", f"Picture for {label.lower()}, multiplied with it")
-        load.clicked.connect(lambda: self._ask_picture(name))
-        take = self.tool("cancel", "Take the picture away")
-        take.setEnabled(texture is not None)
-        take.clicked.connect(lambda: self._set_texture(name, None))
-        inside = QWidget()
-        inside.setLayout(row(text, load, take, stretch=0))
-        layout.addRow(form_label(f"{label} map", "A picture that the value is multiplied with"), inside)
-        return box
-
-    # edits
-
-    def _make(self, name: str, value: Value) -> Edit:
-        assert self.material is not None
-        material = self.context.document.scene.material(self.material)
-        if name == "name":
-            return SetMaterial(self.material, name=str(value), label="Rename material")
-        if name == "opacity":
-            return SetMaterial(self.material, opacity=float(value), label=f"Opacity of {material.name}")  # type: ignore[arg-type]
-        if name == "catches":
-            what = "catches shadows" if value else "is an ordinary surface"
-            return SetMaterial(self.material, catches=bool(value), label=f"{material.name} {what}")
-        model = self._brdf(material.model)
-        info = param_infos(model.Params).get(name) if model is not None else None
-        label = f"{info.label if info else name} of {material.name}"
-        return SetMaterial(self.material, {name: value}, label=label)
-
-    def _change_model(self, name: str) -> None:
-        if self.material is None:
-            return
-        material = self.context.document.scene.material(self.material)
-        model = self._brdf(name)
-        if model is None or name == material.model:
-            return
-        kept = {n: material.values[n] for n in param_infos(model.Params) if n in material.values}
-        self.context.editing.apply(
-            SetMaterial(self.material, kept, model=name, label=f"Kind of {material.name}")
-        )
+    # what is done
 
     def add(self) -> None:
         """A new material."""
@@ -255,8 +169,6 @@ class MaterialsPanel(Panel):
         model = "ggx" if "ggx" in models else next(iter(models), "lambert")
         made = Material(id=new_id("material"), name=self._free_name("Material"), model=model)
         if self.context.editing.apply(AddMaterial(made)):
-            self._soon.stop()
-            self.refresh()
             self.choose(made.id)
 
     def copy(self) -> None:
@@ -265,54 +177,68 @@ class MaterialsPanel(Panel):
             return
         old = self.context.document.scene.material(self.material)
         made = dataclasses.replace(old, id=new_id("material"), name=self._free_name(old.name))
-        if self.context.editing.apply(AddMaterial(made, "Duplicate material")):
-            self._soon.stop()
-            self.refresh()
+        if self.context.editing.apply(AddMaterial(made, f"Duplicate {old.name}")):
             self.choose(made.id)
 
     def remove(self) -> None:
-        """Delete it, if nothing uses it."""
-        if self.material is not None:
-            self.context.editing.apply(RemoveMaterial(self.material))
+        """Delete the chosen ones, if nothing uses them."""
+        self._remove(self.chosen)
+
+    def remove_unused(self) -> None:
+        """Delete all that no object has."""
+        scene = self.context.document.scene
+        there = users_of(scene)
+        unused = tuple(m for m in scene.materials if not there[m])
+        if unused:
+            self._remove(unused)
+        else:
+            self.context.journal.write("Every material is used.")
+
+    def _remove(self, materials: tuple[MaterialId, ...]) -> None:
+        names = [self.context.document.scene.material(m).name for m in materials]
+        if names:
+            what = names[0] if len(names) == 1 else f"{len(names)} materials"
+            self.context.editing.apply(
+                Compound(f"Delete {what}", tuple(RemoveMaterial(m) for m in materials))
+            )
 
     def assign_to_selection(self) -> None:
-        """Give all chosen objects this material."""
-        meshes = self._selected_meshes()
-        if self.material is not None and meshes:
-            edits = tuple(Assign(node.id, self.material) for node in meshes)
-            name = self.context.document.scene.material(self.material).name
-            self.context.editing.apply(Compound(f"Assign {name}", edits))
+        """Give all chosen objects this material, or the chosen slot of one."""
+        if self.material is None:
+            return
+        nodes = self.context.session.selection
+        slot = self.slot.currentIndex() - 1 if self.slot.count() else -1
+        edit = assigned(self.context.document.scene, nodes, self.material, slot if slot >= 0 else None)
+        if edit is not None:
+            self.context.editing.apply(edit)
 
     def select_users(self) -> None:
-        """Choose the objects that have it."""
-        scene = self.context.document.scene
-        self.context.session.select(n.id for n in scene.of(MeshObject) if self.material in n.materials)
+        """Choose the objects that have them."""
+        self.context.session.select(users(self.context.document.scene, self.chosen))
+
+    def _rename(self, material: MaterialId, name: str) -> None:
+        old = self.context.document.scene.material(material).name
+        if name and name != old:
+            self.context.editing.apply(SetMaterial(material, name=name, label=f"Rename {old}"))
+        elif not name:
+            self.list.set_theme(self.theme)  # draws the old name again
+            self._soon.start(0)
+
+    def _menu(self, place: QPoint) -> None:
+        menu = QMenu(self)
+        menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        if self.material is not None:
+            menu.addAction("Rename\tF2", self.list.edit_name)
+            menu.addAction("Duplicate", self.copy)
+            assign = menu.addAction("Assign to what is chosen", self.assign_to_selection)
+            assign.setEnabled(self.assign.isEnabled())
+            menu.addAction("Select objects that have it", self.select_users)
+            menu.addSeparator()
+            menu.addAction("Delete", self.remove)
+        menu.addAction("Delete all that no object has", self.remove_unused)
+        menu.popup(self.list.viewport().mapToGlobal(place))
 
     def _free_name(self, name: str) -> str:
         taken = {m.name for m in self.context.document.scene.materials.values()}
         stem = name.rstrip("0123456789 ") or name
         return next(n for n in (name, *(f"{stem} {i}" for i in range(2, 10**6))) if n not in taken)
-
-    def _ask_picture(self, name: str) -> None:
-        path, _ = QFileDialog.getOpenFileName(self, "Picture for the material", "", PICTURES)
-        if path:
-            self.load_picture(name, Path(path))
-
-    def load_picture(self, name: str, path: Path) -> None:
-        """Read a picture away from the window's thread, then lay it on the surface."""
-        material = self.material
-
-        def read(job: Job) -> Image:
-            from studio_core.imaging.io import read_image
-
-            return read_image(path)
-
-        def done(image: Image) -> None:
-            if material in self.context.document.scene.materials and material is not None:
-                self.context.editing.apply(SetTexture(material, name, Texture(image)))
-
-        self.context.tasks.run(f"Reading {path.name}", read, done)
-
-    def _set_texture(self, name: str, texture: Texture | None) -> None:
-        if self.material is not None:
-            self.context.editing.apply(SetTexture(self.material, name, texture))

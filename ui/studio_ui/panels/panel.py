@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QAction
 from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QScrollArea, QToolButton, QVBoxLayout, QWidget
+from shiboken6 import isValid
 
 from studio_ui.context import Context, Subscriptions
 from studio_ui.icons import icon
@@ -36,6 +37,7 @@ class Panel(QWidget):
     def set_theme(self, theme: Theme) -> None:
         """Icons and colours of another theme."""
         self.theme = theme
+        self._icons = [(button, name) for button, name in self._icons if isValid(button)]
         for button, name in self._icons:
             button.setIcon(icon(name, theme.text, theme.on_accent))
 
@@ -52,8 +54,16 @@ class Panel(QWidget):
         self._icons.append((button, name))
         return button
 
-    def scroller(self) -> QVBoxLayout:
-        """A column inside a vertical scroll area that fills the panel's rest."""
+    @staticmethod
+    def column_of(widget: QWidget) -> QVBoxLayout:
+        """A column that fills a widget."""
+        made = QVBoxLayout(widget)
+        made.setContentsMargins(0, 0, 0, 0)
+        made.setSpacing(GAP)
+        return made
+
+    def scroller(self, into: QVBoxLayout | None = None) -> QVBoxLayout:
+        """A column inside a vertical scroll area that fills the rest of the panel, or of `into`."""
         area = QScrollArea()
         area.setWidgetResizable(True)
         area.setFrameShape(QFrame.Shape.NoFrame)
@@ -63,7 +73,7 @@ class Panel(QWidget):
         column.setContentsMargins(0, 0, 2, 0)
         column.setSpacing(GAP)
         area.setWidget(inside)
-        self.column.addWidget(area, 1)
+        (into or self.column).addWidget(area, 1)
         return column
 
     def inside(self, column: QVBoxLayout) -> QVBoxLayout:

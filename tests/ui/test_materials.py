@@ -1,0 +1,208 @@
+"""The materials panel: the list, several materials at once, pictures, and materials that are dragged."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import assume, given
+from hypothesis import strategies as st
+from oracles.raycast import nearest
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QLineEdit
+from ui_support import Driver, room
+
+from studio_core.edits import Add, AddMaterial, Assign, SetTexture
+from studio_core.imaging.encode import write_png
+from studio_core.scene.geometry import Geometry, Image, Texture
+from studio_core.scene.nodes import Material, MeshObject
+from studio_core.scene.transform import Transform, looking
+from studio_core.session import View
+from studio_ui.canvas.projection import eye_of, ray
+from studio_ui.material_drag import MIME, dragged_material, drop_material, slot_at
+from studio_ui.panels.materials import MaterialsPanel
+from studio_ui.panels.texture_row import small_pixmap
+
+
+def panel_of(driver: Driver) -> MaterialsPanel:
+    found: MaterialsPanel = driver.window.panels["materials"]
+    return found
+
+
+def choose(driver: Driver, *materials: str) -> MaterialsPanel:
+    panel = panel_of(driver)
+    driver.until(lambda: all(m in panel.list.rows for m in materials))
+    panel.list.clearSelection()
+    for material in materials:
+        panel.list.rows[material].setSelected(True)
+    assert set(panel.chosen) == set(materials)
+    return panel
+
+
+def test_the_list_says_who_has_a_material(driver: Driver) -> None:
+    panel = panel_of(driver)
+    driver.document.apply(AddMaterial(Material(id="new", name="New")))
+    driver.until(lambda: len(panel.list.rows) == 3)
+    assert [row.text(1) for row in panel.list.rows.values()] == ["2", "1", "unused"]
+    driver.document.apply(Assign("stool", "red"))
+    driver.until(lambda: [row.text(1) for row in panel.list.rows.values()] == ["3", "unused", "unused"])
+    panel.choose("red")
+    panel.select_users()
+    assert driver.session.selection == ("seat", "back", "stool")
+    panel.remove_unused()
+    assert list(driver.document.scene.materials) == ["red"]
+    assert driver.labels()[3:] == ["Delete 2 materials"]
+    panel.remove_unused()
+    assert len(driver.labels()) == 4
+
+
+def test_a_material_is_renamed_in_place(driver: Driver) -> None:
+    panel = choose(driver, "red")
+    driver.window.docks["materials"].raise_()
+    panel.list.setCurrentItem(panel.list.rows["red"])
+    panel.list.edit_name()
+    editor = panel.list.findChild(QLineEdit)
+    assert editor is not None
+    editor.setText("Brick")
+    driver.bot.keyClick(editor, Qt.Key.Key_Return)
+    driver.until(lambda: driver.document.scene.material("red").name == "Brick")
+    assert driver.labels()[1:] == ["Rename Red"]
+
+
+def test_several_materials_are_edited_at_once(driver: Driver) -> None:
+    green = Material(
+        id="green", name="Green", model="ggx", values={"base_color": (0.1, 0.5, 0.1), "roughness": 0.2}
+    )
+    driver.document.apply(AddMaterial(green))
+    panel = choose(driver, "red", "green")
+    assert panel.form is not None
+    fields: Any = panel.form.fields
+    assert fields["roughness"].spin.mixed
+    assert not fields["metallic"].spin.mixed
+    slider = fields["roughness"].slider
+    slider.setSliderDown(True)
+    slider.setValue(300)
+    slider.setValue(400)
+    slider.setSliderDown(False)
+    scene = driver.document.scene
+    assert scene.material("red").values["roughness"] == scene.material("green").values["roughness"]
+    assert driver.labels()[2:] == ["Roughness of 2 materials"]
+    panel = choose(driver, "red", "blue")
+    assert panel.form is None, "they are of different kinds"
+    assert panel.editor.kind.currentIndex() == -1
+    assert panel.common is not None
+    panel.common.fields["opacity"].spin.setValue(0.25)  # type: ignore[attr-defined]
+    assert [driver.document.scene.material(m).opacity for m in ("red", "blue")] == [0.25, 0.25]
+    index = panel.editor.kinds.index("ggx")
+    panel.editor.kind.activated.emit(index)
+    assert {driver.document.scene.material(m).model for m in ("red", "blue")} == {"ggx"}
+    assert driver.labels()[3:] == ["Opacity of 2 materials", "Kind of 2 materials"]
+
+
+def test_a_material_can_catch_shadows(driver: Driver) -> None:
+    panel = choose(driver, "blue")
+    assert panel.common is not None
+    panel.common.fields["catches"].box.click()  # type: ignore[attr-defined]
+    assert driver.document.scene.material("blue").catches
+    assert driver.labels()[1:] == ["Catches shadows of Blue"]
+
+
+def two_slots() -> MeshObject:
+    """A square in the xy plane: its left half has slot 0, its right half slot 1."""
+    corners = np.array([[x, y, 0] for x in (-1, 0, 1) for y in (0, 1)], np.float32)
+    faces = np.array([[0, 2, 3], [0, 3, 1], [2, 4, 5], [2, 5, 3]], np.uint32)
+    geometry = Geometry(corners, faces, slots=np.array([0, 0, 1, 1], np.uint16))
+    return MeshObject(id="board", name="Board", geometry=geometry, materials=("red", "blue"))
+
+
+def test_a_material_goes_to_one_slot_of_an_object(driver: Driver) -> None:
+    driver.document.apply(Add((two_slots(),), (Material(id="new", name="New"),)))
+    panel = panel_of(driver)
+    driver.session.select(["board"])
+    choose(driver, "new")
+    slots = [panel.slot.itemText(i) for i in range(panel.slot.count())]
+    assert slots == ["All slots", "1: Red", "2: Blue"]
+    panel.slot.setCurrentIndex(2)
+    panel.assign.click()
+    assert driver.document.scene["board"].materials == ("red", "new")
+    assert driver.labels()[2:] == ["New on Board"]
+    driver.session.select(["stool"])
+    assert panel.slot.isHidden()
+    driver.session.select([])
+    assert not panel.assign.isEnabled()
+
+
+def test_a_material_is_dragged_onto_what_is_seen(driver: Driver) -> None:
+    panel = choose(driver, "blue")
+    data = panel.list.mimeData([panel.list.rows["blue"]])
+    assert data.formats() == [MIME]
+    assert dragged_material(data) == "blue"
+    at = driver.at((-1.0, 0.5, 0.5))
+    x, y = at.x() / driver.viewport.width(), at.y() / driver.viewport.height()
+    assert drop_material(driver.context, driver.viewport, "blue", x, y)
+    assert driver.document.scene["seat"].materials == ("blue",)
+    assert driver.document.scene["back"].materials == ("red",)
+    assert driver.labels()[1:] == ["Blue on Seat"]
+    assert not drop_material(driver.context, driver.viewport, "blue", 0.01, 0.01)
+    assert not drop_material(driver.context, driver.viewport, "gone", x, y)
+    assert driver.problems() == []
+
+
+@given(
+    st.floats(0.05, 0.95), st.floats(0.05, 0.95), st.tuples(*[st.floats(-0.5, 0.5)] * 3), st.floats(0.5, 3)
+)
+def test_the_slot_under_the_mouse_is_that_of_the_nearest_face(
+    x: float, y: float, place: tuple[float, float, float], scale: float
+) -> None:
+    """Against a ray caster that knows nothing of cameras or transforms."""
+    world = Transform(place, scale=scale)
+    view = View(looking((0.4, 0.8, 3.0), (0.0, 0.5, 0.0)), 40.0, 64, 48)
+    geometry = two_slots().geometry
+    mesh = (geometry.positions.astype(np.float64), geometry.faces, world.matrix())
+    found = nearest([mesh], eye_of(view)[None], ray(view, x, y)[None])
+    assume(found.margin[0] > 1e-9)
+    assert geometry.slots is not None
+    expected = int(geometry.slots[found.face[0]]) if found.face[0] >= 0 else None
+    assert slot_at(geometry, world, view, x, y) == expected
+
+
+def test_pictures_are_laid_repeated_and_taken_away(driver: Driver, tmp_path: Path) -> None:
+    path = tmp_path / "wood.png"
+    write_png(path, np.full((20, 40, 3), 120, np.uint8))
+    panel = choose(driver, "red")
+    row = panel.editor.textures["base_color"]
+    assert not row.remove.isEnabled()
+    panel.load_picture("base_color", path)
+    driver.until(lambda: "base_color" in driver.document.scene.material("red").textures)
+    driver.until(lambda: row.text.text() == "40 × 20")
+    row.repeat.setValue(3.0)
+    assert driver.document.scene.material("red").textures["base_color"].scale == (3.0, 3.0)
+    driver.until(lambda: row.remove.isEnabled())
+    row.remove.click()
+    assert not driver.document.scene.material("red").textures
+    assert driver.labels()[1:] == ["Picture of Red"] * 3
+    uneven = Texture(Image(np.ones((4, 4, 1), np.float32)), (2.0, 1.0))
+    driver.document.apply(SetTexture("red", "base_color", uneven))
+    driver.until(lambda: row.repeat.value() == 2.0)
+    row.repeat.setValue(4.0)
+    assert driver.document.scene.material("red").textures["base_color"].scale == (4.0, 2.0)
+
+
+@pytest.mark.parametrize("channels", [1, 3, 4])
+@pytest.mark.parametrize("dtype", [np.uint8, np.float32])
+def test_any_picture_has_a_small_one(driver: Driver, channels: int, dtype: Any) -> None:
+    made = small_pixmap(Image(np.ones((50, 130, channels), dtype)))
+    assert 0 < made.width() <= 40
+    assert 0 < made.height() <= 26
+
+
+def test_another_theme_after_other_forms(driver: Driver) -> None:
+    panel = panel_of(driver)
+    for material in ("blue", "red", "blue"):
+        panel.choose(material)
+    driver.bot.wait(1)
+    driver.do("view.light")
+    driver.do("view.dark")
+    assert room().materials.keys() == panel.list.rows.keys()

@@ -1,0 +1,201 @@
+"""What the chosen materials are like: name, opacity, model of reflectance with its parameters, pictures."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+from PySide6.QtWidgets import QFileDialog, QToolButton, QVBoxLayout, QWidget
+
+from studio_core.contract import Brdf
+from studio_core.edits import Compound, Edit, SetMaterial, SetTexture
+from studio_core.errors import PluginError
+from studio_core.params import ParamInfo, Value, defaults, param_infos
+from studio_core.scene.geometry import Image, Texture
+from studio_core.scene.nodes import Material, MaterialId
+from studio_core.shading.job import Job
+from studio_ui.context import Context
+from studio_ui.fields import Combo
+from studio_ui.panels.panel import clear, note
+from studio_ui.panels.texture_row import TextureRow
+from studio_ui.param_form import ParamForm, form_label, form_layout
+from studio_ui.sinks import EditSink
+from studio_ui.spin import MIXED
+
+_COMMON: Mapping[str, ParamInfo] = param_infos(Material)
+PICTURES = "Pictures (*.png *.jpg *.jpeg *.exr *.hdr *.tif *.tiff)"
+
+
+class MaterialForm(QWidget):
+    """Built anew when other materials or another model are to be shown. An edit is one step for all."""
+
+    def __init__(self, context: Context, tool: Callable[[str, str], QToolButton]) -> None:
+        super().__init__()
+        self.materials: tuple[MaterialId, ...] = ()
+        self.form: ParamForm | None = None
+        self.common: ParamForm | None = None
+        self.kind = Combo()
+        self.kinds: list[str] = []
+        self.textures: dict[str, TextureRow] = {}
+        self._context, self._tool = context, tool
+        self._sink = EditSink(context.editing, self._make, self._label)
+        self._built: object = self
+        self._column = QVBoxLayout(self)
+        self._column.setContentsMargins(0, 0, 0, 0)
+
+    def show_materials(self, chosen: tuple[MaterialId, ...]) -> None:
+        """Those materials as they are now."""
+        self.materials = chosen
+        scene = self._context.document.scene
+        materials = [scene.material(m) for m in chosen]
+        models = {material.model for material in materials}
+        model = self._brdf(materials[0].model) if len(models) == 1 else None
+        key = (chosen, models, model is not None, self._context.warm)
+        if key != self._built:
+            self._built = key
+            self._build(materials, model)
+        if not materials:
+            return
+        last = materials[-1]
+        if self.common is not None:
+            values: dict[str, Any] = {name: getattr(last, name) for name in _COMMON}
+            mixed = {n for n in values if any(getattr(m, n) != values[n] for m in materials)}
+            self.common.show_values(values, mixed)
+        if self.form is not None and model is not None:
+            usual = defaults(model.Params)
+            every = [{**usual, **material.values} for material in materials]
+            mixed = {n for n in usual if any(one[n] != every[-1][n] for one in every)}
+            self.form.show_values(every[-1], mixed)
+        for name, shown in self.textures.items():
+            shown.show_texture(last.textures.get(name))
+
+    def load_picture(self, name: str, path: Path) -> None:
+        """Read a picture away from the window's thread, then lay it on the surface."""
+        materials = self.materials
+
+        def read(job: Job) -> Image:
+            from studio_core.imaging.io import read_image
+
+            return read_image(path)
+
+        def done(image: Image) -> None:
+            there = [m for m in materials if m in self._context.document.scene.materials]
+            if there:
+                self._put_texture(there[-1], name, Texture(image))
+
+        self._context.tasks.run(f"Reading {path.name}", read, done)
+
+    def _brdf(self, name: str) -> Brdf | None:
+        if not self._context.warm:
+            return None
+        try:
+            return self._context.host.brdf(name)
+        except PluginError:
+            return None
+
+    def _build(self, materials: list[Material], model: Brdf | None) -> None:
+        self._sink.commit()  # a slider that is held goes with its form
+        clear(self._column)
+        self.form = self.common = None
+        self.textures = {}
+        if not materials:
+            self._column.addWidget(note("The scene has no materials yet."))
+            return
+        if len(materials) > 1:
+            told = f"What is set counts for all {len(materials)} materials; {MIXED} where they differ."
+            self._column.addWidget(note(told))
+        usual = {"opacity": 1.0, "catches": False}
+        self.common = ParamForm(_COMMON, self._sink, defaults=usual)
+        self._column.addWidget(self.common)
+        self._column.addWidget(self._kinds(materials))
+        if model is not None:
+            infos = param_infos(model.Params)
+            self.form = ParamForm(infos, self._sink, defaults=defaults(model.Params))
+            self._column.addWidget(self.form)
+            for name in model.textures if len(materials) == 1 else ():
+                self._column.addWidget(self._texture(materials[0].id, name, infos[name].label))
+        elif not self._context.warm:
+            self._column.addWidget(note("Loading…"))
+        elif len({material.model for material in materials}) == 1:
+            name = materials[0].model
+            self._column.addWidget(note(f"The kind {name!r} is not installed: see Help ▸ Plugins."))
+
+    def _kinds(self, materials: list[Material]) -> QWidget:
+        box = QWidget()
+        layout = form_layout(box)
+        self.kind = Combo()
+        self.kind.setAccessibleName("Kind")
+        self.kind.setPlaceholderText(MIXED)
+        models = dict.fromkeys(material.model for material in materials)
+        self.kinds = [*self._context.host.names("brdf")]
+        self.kinds += [name for name in models if name not in self.kinds]
+        for name in self.kinds:
+            brdf = self._brdf(name)
+            self.kind.addItem(brdf.label if brdf is not None else name, name)
+        self.kind.setCurrentIndex(self.kinds.index(materials[0].model) if len(models) == 1 else -1)
+        self.kind.setEnabled(self._context.warm)
+        self.kind.activated.connect(lambda i: self._change_model(self.kinds[i]))
+        layout.addRow(form_label("Kind", "How the surface reflects light"), self.kind)
+        return box
+
+    def _texture(self, material: MaterialId, name: str, label: str) -> QWidget:
+        box = QWidget()
+        layout = form_layout(box)
+        made = TextureRow(
+            label,
+            self._tool,
+            lambda: self._ask_picture(name),
+            lambda texture: self._put_texture(material, name, texture),
+        )
+        self.textures[name] = made
+        layout.addRow(form_label(f"{label} map", "A picture that the value is multiplied with"), made)
+        return box
+
+    def _ask_picture(self, name: str) -> None:
+        path, _ = QFileDialog.getOpenFileName(self, "Picture for the material", "", PICTURES)
+        if path:
+            self.load_picture(name, Path(path))
+
+    # edits
+
+    def _label(self, name: str) -> str:
+        scene = self._context.document.scene
+        there = [scene.material(m) for m in self.materials if m in scene.materials]
+        model = self._brdf(there[-1].model)
+        infos = {**(param_infos(model.Params) if model is not None else {}), **_COMMON}
+        what = there[0].name if len(there) == 1 else f"{len(there)} materials"
+        return f"{infos[name].label if name in infos else name} of {what}"
+
+    def _make(self, name: str, value: Value) -> Edit:
+        there = [m for m in self.materials if m in self._context.document.scene.materials]
+        label = self._label(name)
+        edits: list[Edit] = []
+        for number, material in enumerate(there, 1):
+            given: Any = f"{value} {number}" if name == "name" and len(there) > 1 else value
+            if name in _COMMON:
+                edits.append(SetMaterial(material, **{name: given}, label=label))
+            else:
+                edits.append(SetMaterial(material, {name: given}, label=label))
+        return edits[0] if len(edits) == 1 else Compound(label, tuple(edits))
+
+    def _change_model(self, name: str) -> None:
+        model = self._brdf(name)
+        if model is None:
+            return
+        scene = self._context.document.scene
+        edits: list[Edit] = []
+        for chosen in self.materials:
+            material = scene.material(chosen)
+            if material.model != name:
+                kept = {n: material.values[n] for n in param_infos(model.Params) if n in material.values}
+                edits.append(SetMaterial(chosen, kept, model=name))
+        if edits:
+            what = scene.material(self.materials[0]).name
+            what = what if len(self.materials) == 1 else f"{len(self.materials)} materials"
+            self._context.editing.apply(Compound(f"Kind of {what}", tuple(edits)))
+
+    def _put_texture(self, material: MaterialId, name: str, texture: Texture | None) -> None:
+        if material in self._context.document.scene.materials:
+            label = f"Picture of {self._context.document.scene.material(material).name}"
+            self._context.editing.apply(SetTexture(material, name, texture, label))

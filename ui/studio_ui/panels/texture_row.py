@@ -1,0 +1,92 @@
+"""A picture on a parameter of a material: what it is, another one, none, how often it is repeated."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+
+import numpy as np
+from PySide6.QtCore import QSize, Qt
+from PySide6.QtGui import QImage, QPixmap
+from PySide6.QtWidgets import QLabel, QToolButton, QVBoxLayout, QWidget
+
+from studio_core.params import ParamInfo
+from studio_core.scene.geometry import Image, Texture
+from studio_ui.panels.panel import row
+from studio_ui.spin import Spin
+
+_REPEAT = ParamInfo(
+    "number", "Repeat", "How often the picture is repeated over the surface's own unit", unit="×", low=0.01,
+    high=1000.0, scale="log",
+)  # fmt: skip
+_ICON = QSize(40, 26)
+
+
+class TextureRow(QWidget):
+    """`ask()` wants another picture, `put(texture)` is an edit; None takes the picture away."""
+
+    def __init__(
+        self,
+        label: str,
+        tool: Callable[[str, str], QToolButton],
+        ask: Callable[[], object],
+        put: Callable[[Texture | None], object],
+    ) -> None:
+        super().__init__()
+        self._texture: Texture | None = None
+        self._put = put
+        self.picture = QLabel()
+        self.text = QLabel()
+        self.text.setProperty("role", "dim")
+        load = tool("open", f"Picture for {label.lower()}, which it is multiplied with")
+        load.clicked.connect(lambda: ask())
+        self.remove = tool("cancel", "Take the picture away")
+        self.remove.clicked.connect(lambda: put(None))
+        self.repeat = Spin(_REPEAT, decimals=2)
+        self.repeat.setToolTip(_REPEAT.doc)
+        self.repeat.valueChanged.connect(self._repeat)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.setSpacing(2)
+        column.addLayout(row(self.picture, self.text, load, self.remove, stretch=1))
+        column.addWidget(self.repeat)
+
+    def show_texture(self, texture: Texture | None) -> None:
+        """What lies there now."""
+        if texture is None or self._texture is None or texture.image is not self._texture.image:
+            self.picture.setVisible(texture is not None)
+            if texture is not None:
+                self.picture.setPixmap(small_pixmap(texture.image))
+        self._texture = texture
+        self.remove.setEnabled(texture is not None)
+        self.repeat.setVisible(texture is not None)
+        if texture is None:
+            self.text.setText("No picture")
+            return
+        height, width = texture.image.pixels.shape[:2]
+        self.text.setText(f"{width} × {height}")
+        self.repeat.show_value(texture.scale[0])
+
+    def _repeat(self, value: float) -> None:
+        old = self._texture
+        if old is not None and abs(value - old.scale[0]) > 1e-9:
+            across, up = old.scale
+            self._put(dataclasses.replace(old, scale=(value, value * up / across if across else value)))
+
+
+def small_pixmap(image: Image) -> QPixmap:
+    """The picture as it is displayed, small."""
+    step = max(1, min(image.pixels.shape[0] // _ICON.height(), image.pixels.shape[1] // _ICON.width()))
+    pixels = image.pixels[::step, ::step]
+    if pixels.shape[2] != 3:
+        pixels = pixels[..., [0, 0, 0]] if pixels.shape[2] == 1 else pixels[..., :3]
+    if pixels.dtype != np.uint8:
+        from studio_core.kernels.tonemap import tonemap
+
+        kind = "srgb" if image.encoding == "linear" else "raw"
+        pixels = tonemap(pixels, kind=kind)
+    pixels = np.ascontiguousarray(pixels)
+    height, width = pixels.shape[:2]
+    made = QImage(pixels.tobytes(), width, height, 3 * width, QImage.Format.Format_RGB888)
+    keep, smooth = Qt.AspectRatioMode.KeepAspectRatio, Qt.TransformationMode.SmoothTransformation
+    return QPixmap.fromImage(made.scaled(_ICON, keep, smooth))
