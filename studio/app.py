@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 import contextlib
-import faulthandler
 import os
 import subprocess
 import sys
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, TextIO
+from typing import Any
 
 from PySide6.QtCore import QCoreApplication, QEvent, Qt
 from PySide6.QtWidgets import QApplication
 
 from studio import compile_ahead, samples
+from studio.crash_log import crash_log
 from studio_core.contract import Services, ShadingBackend
 from studio_core.document import Document
 from studio_core.errors import LucarneError
@@ -150,7 +150,7 @@ def run_window(path: Path | None, *, read_only: bool = False) -> int:
     assert isinstance(application, QApplication)
     application.setApplicationName("Lucarne")
     application.setDesktopFileName("lucarne")
-    with _crash_log(settings.folder) as crashed:
+    with crash_log(settings.folder) as crashed:
         studio = assemble(settings=settings)
         compiling: list[subprocess.Popen[bytes]] = []
         before, sys.excepthook = sys.excepthook, _hook(studio.context.journal)
@@ -158,9 +158,7 @@ def run_window(path: Path | None, *, read_only: bool = False) -> int:
             studio.window.canvas.start()
             studio.window.show()
             if crashed:
-                studio.context.journal.write(
-                    "The program crashed last time; its report is here.", "warning", crashed
-                )
+                studio.window.front.crashed(crashed)
             _first(studio, path, read_only)
             studio.bridge.later(
                 COMPILE_AFTER, lambda: studio.executors[1].submit(lambda: _compile(compiling))
@@ -237,24 +235,3 @@ def _hook(journal: Journal) -> Callable[..., None]:
         journal.problem("Something in the window", error)
 
     return tell
-
-
-@contextlib.contextmanager
-def _crash_log(folder: Path) -> Any:
-    """Write a report when the process dies; gives what the last one wrote."""
-    file: TextIO | None = None
-    report = ""
-    path = folder / "crash.txt"
-    try:
-        with contextlib.suppress(OSError):
-            folder.mkdir(parents=True, exist_ok=True)
-            report = path.read_text("utf-8", "replace") if path.exists() else ""
-            file = path.open("w", encoding="utf-8")
-            faulthandler.enable(file)
-        yield report
-    finally:
-        if file is not None:
-            faulthandler.disable()
-            file.close()
-            with contextlib.suppress(OSError):
-                path.unlink()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import itertools
+import threading
 from pathlib import Path
 
 import pytest
@@ -11,7 +12,8 @@ from PySide6.QtGui import QGuiApplication
 from ui_support import Driver, Make, room
 
 from studio_core.edits import SetFields
-from studio_core.errors import ProjectError
+from studio_core.errors import Cancelled, ProjectError
+from studio_core.shading.job import Job
 from studio_ui.files.report import ReportDialog, report_text, versions
 
 
@@ -105,3 +107,38 @@ def test_missing_folders_and_files_that_are_none(driver: Driver, tmp_path: Path)
         driver.idle()
         assert words in driver.problems()[-1]
         assert "\n" not in driver.problems()[-1]
+
+
+def test_a_crash_stays_told_whatever_is_opened(driver: Driver) -> None:
+    driver.window.front.crashed("Fatal Python error: Segmentation fault")
+    driver.context.journal.write("Bad.", "problem")
+    driver.do("file.new")
+    ((text, _),) = bars(driver).told
+    assert "ended unexpectedly" in text
+    bars(driver).bars[0].close_button.click()
+    assert bars(driver).told == []
+
+
+def test_long_tasks_are_told_with_progress_and_cancel(make: Make) -> None:
+    driver = make(threads=True)
+    driver.show(room())
+    go = threading.Event()
+    bar = driver.window.front.tasks
+    bar._patience = 0.0
+
+    def work(job: Job) -> None:
+        job.checkpoint(1, 4)
+        go.wait(60)
+        job.checkpoint(2, 4)
+
+    ended: list[Exception] = []
+    driver.context.tasks.run("Importing chair", work, lambda _: ended.append(AssertionError()), ended.append)
+    driver.until(lambda: bar.isVisible() and bar.progress.value() == 250)
+    assert bar.text.text() == "Importing chair…"
+    bar.cancel.click()
+    assert bar.text.text() == "Stopping: Importing chair"
+    assert not bar.cancel.isEnabled()
+    go.set()
+    driver.until(bar.isHidden)
+    assert [type(error) for error in ended] == [Cancelled]
+    assert driver.problems() == []

@@ -13,8 +13,11 @@ from studio_ui.files.drop_overlay import DropOverlay
 from studio_ui.files.notice_bar import Notices
 from studio_ui.files.read_only_bar import ReadOnlyBar
 from studio_ui.files.start_page import Begin, StartPage
+from studio_ui.files.task_bar import TaskBar
 from studio_ui.project_files import ProjectFiles
 from studio_ui.theme import Theme
+
+_CRASHED = "Lucarne ended unexpectedly last time. What it had kept of your work is offered by itself."
 
 
 class Front:
@@ -41,10 +44,16 @@ class Front:
         self._drop_overlay = drop_overlay
         self.widget.fill(self.start_page)
         self.widget.fill(drop_overlay)
+        self.tasks = TaskBar(context.tasks)
         self.widget.bar(self.read_only)
+        self.widget.bar(self.tasks)
         self.widget.bar(self.notices)
         self._subscriptions = Subscriptions()
         self._subscriptions.add(files.opened.connect(self._opened))
+
+    def crashed(self, report: str) -> None:
+        """The program died last time; `report` is what the interpreter wrote then."""
+        self.notices.tell(_CRASHED, report)
 
     def set_theme(self, theme: Theme) -> None:
         """Colours and icons."""
@@ -58,6 +67,7 @@ class Front:
         self.start_page.close_panel()
         self.notices.close_panel()
         self.read_only.close_panel()
+        self.tasks.close_panel()
 
     def _empty(self) -> None:
         """The bare canvas, until another document is opened."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 
 from PySide6.QtCore import QSize, Qt
@@ -87,6 +88,7 @@ class Notices(QFrame):
         self.setObjectName("notices")
         self._theme = DARK
         self._rows: list[tuple[Bar, Entry, int]] = []
+        self._pinned: set[str] = set()
         self._column = QVBoxLayout(self)
         self._column.setContentsMargins(0, 0, 0, 0)
         self._column.setSpacing(6)
@@ -110,10 +112,17 @@ class Notices(QFrame):
         for bar, _, _ in self._rows:
             bar.set_theme(theme)
 
+    def tell(self, text: str, detail: str) -> None:
+        """Something that stays until it is dismissed, whatever is opened meanwhile."""
+        entry = Entry("problem", text, detail, time.time())
+        self._pinned.add(text)
+        self._added(entry)
+
     def clear(self) -> None:
-        """Dismiss all."""
-        while self._rows:
-            self._drop(self._rows[0][0])
+        """Dismiss what belongs to a document."""
+        for bar, entry, _ in tuple(self._rows):
+            if entry.text not in self._pinned:
+                self._drop(bar)
 
     def close_panel(self) -> None:
         """Stop listening."""

@@ -111,6 +111,12 @@ def _day(moment: time.struct_time) -> int:
     return datetime.date(moment.tm_year, moment.tm_mon, moment.tm_mday).toordinal()
 
 
+def when_title(seconds: float) -> str:
+    """The same as the beginning of a line."""
+    text = when(seconds)
+    return text[:1].upper() + text[1:]
+
+
 def folder_text(path: Path, home: Path | None = None) -> str:
     """The folder of a file, short: the home folder as `~`."""
     home = home or Path.home()

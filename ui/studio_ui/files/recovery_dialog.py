@@ -22,7 +22,7 @@ from studio_core.project.outline import Outline
 from studio_core.project.records import Revision
 from studio_ui.ask import LeftoverChoice, Recover
 from studio_ui.files.leftovers import Leftover
-from studio_ui.files.recent import when
+from studio_ui.files.recent import when_title
 
 _PICTURE = (256, 144)
 
@@ -160,7 +160,7 @@ def _version(
     if title:
         words.addWidget(_words(title, "title"))
     if revision is not None:
-        words.addWidget(_words(when(revision.time).capitalize(), "title" if not title else ""))
+        words.addWidget(_words(when_title(revision.time), "title" if not title else ""))
     if told is not None:
         words.addWidget(_words(f"{told.objects} objects, {told.materials} materials", "dim"))
         if told.steps:

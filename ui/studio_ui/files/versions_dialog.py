@@ -16,7 +16,7 @@ from PySide6.QtWidgets import (
 )
 
 from studio_core.project.outline import Outline
-from studio_ui.files.recent import when
+from studio_ui.files.recent import when_title
 from studio_ui.panels.panel import note
 
 
@@ -34,7 +34,7 @@ class VersionsDialog(QDialog):
         self.tree.setRootIsDecorated(False)
         self.tree.setUniformRowHeights(True)
         for index, one in enumerate(self._found):
-            saved = when(one.revision.time).capitalize() + ("  (newest)" if index == 0 else "")
+            saved = when_title(one.revision.time) + ("  (newest)" if index == 0 else "")
             item = QTreeWidgetItem([saved, f"{one.objects} objects", ", ".join(one.steps)])
             item.setToolTip(2, "\n".join(one.steps))
             self.tree.addTopLevelItem(item)
