@@ -10,9 +10,8 @@ import numpy as np
 from studio_core.edits import Add, Compound, Edit, Move, Remove, Reparent, SetFields
 from studio_core.photographs import stand_in_photograph
 from studio_core.scene.arranging import is_locked, roots, shifted, turned
-from studio_core.scene.nodes import Camera, Environment, Group, NodeId, Scene, new_id
+from studio_core.scene.nodes import Environment, Group, NodeId, Scene, new_id
 from studio_core.scene.transform import Transform
-from studio_core.session import View
 from studio_ui.canvas import navigation
 from studio_ui.canvas.drags import middle, named
 from studio_ui.canvas.tools import TOOLS, CanvasTools
@@ -45,8 +44,6 @@ class Commands:
             "object.lock": self.lock,
             "object.turn_left": lambda: self.turn(ANGLE),
             "object.turn_right": lambda: self.turn(-ANGLE),
-            "view.new_camera": self.new_camera,
-            "view.aim_camera": self.aim_camera,
             "shade.again": self._context.feed.restart,
             "shade.cancel": self._context.feed.cancel,
         }
@@ -66,7 +63,6 @@ class Commands:
             "redo": lambda: document.can_redo,
             "selection": lambda: bool(self.chosen),
             "movable": lambda: bool(roots(document.scene, self.chosen)),
-            "camera": lambda: any(isinstance(document.scene[n], Camera) for n in self.chosen),
             "group": lambda: any(isinstance(document.scene[n], Group) for n in self.chosen),
             "computing": lambda: feed.busy,
         } | {f"tool_{tool}": partial(self._uses, tool) for tool in TOOLS}
@@ -147,40 +143,6 @@ class Commands:
         scene = self._context.document.scene
         locked = all(scene[n].locked for n in self.chosen)
         self._fields("Unlock" if locked else "Lock", self.chosen, "locked", not locked)
-
-    # view
-
-    def look_through(self, camera: NodeId) -> None:
-        """See what a camera of the scene sees."""
-        scene, view = self._context.document.scene, self._context.session.view
-        node = scene[camera]
-        if isinstance(node, Camera):
-            self._look(View.of(node, scene, view.width, view.height))
-
-    def new_camera(self) -> None:
-        """A camera that sees what is seen now."""
-        scene, view = self._context.document.scene, self._context.session.view
-        taken = {n.name for n in scene.of(Camera)}
-        name = next(n for n in ("Camera", *(f"Camera {i}" for i in range(2, 10**6))) if n not in taken)
-        made = Camera(
-            id=new_id("camera"), name=name, transform=view.transform, fov=view.fov, focus=view.focus
-        )
-        if self._apply(Add((made,), label=f"New {name}")):
-            self._context.session.select([made.id])
-
-    def aim_camera(self) -> None:
-        """Put the chosen camera where the view is."""
-        scene, view = self._context.document.scene, self._context.session.view
-        camera = next((n for n in self.chosen if isinstance(scene[n], Camera)), None)
-        if camera is None:
-            return
-        parent = scene[camera].parent
-        local = view.transform if parent is None else scene.world(parent).inverse() @ view.transform
-        fields = SetFields(camera, {"fov": view.fov, "focus": view.focus})
-        self._apply(Compound(f"Aim {scene[camera].name}", (Move({camera: local}), fields)))
-
-    def _look(self, view: View) -> None:
-        self._tools.looking.flight.to(view)
 
     def _fields(self, verb: str, nodes: tuple[NodeId, ...], name: str, value: bool) -> None:
         if nodes:

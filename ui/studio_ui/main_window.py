@@ -15,6 +15,7 @@ from studio_ui.actions.action_set import ActionSet
 from studio_ui.appearance import Appearance
 from studio_ui.arranging import Arranging
 from studio_ui.ask import Ask
+from studio_ui.cameras import Cameras
 from studio_ui.canvas.choice import CanvasChoice
 from studio_ui.canvas.switch_viewport import SwitchViewport
 from studio_ui.canvas.tools import CanvasTools
@@ -49,6 +50,7 @@ from studio_ui.settings import Settings
 from studio_ui.shortcuts import Shortcuts
 from studio_ui.status import StatusBar
 from studio_ui.transfer import Transfer
+from studio_ui.view_aids import ViewAids
 from studio_ui.view_controls import ViewControls
 from studio_ui.viewing import Viewing
 
@@ -97,11 +99,15 @@ class MainWindow(QMainWindow):
         )
         for panel in self.panels.values():
             panel.use_actions(self.actions_.actions)
-        self.menus = Menus(self.menuBar(), self.actions_, context, self.commands, self.files)
+        self.menus = Menus(self.menuBar(), self.actions_, self.cameras, self.files)
         self.menus.offer_samples(self._samples)
         self.menus.offer_panels(self.docks)
         self._make_bar()
-        wearers = [self.front.set_theme, *(panel.set_theme for panel in self.panels.values())]
+        wearers = [
+            self.front.set_theme,
+            self.aids.set_theme,
+            *(panel.set_theme for panel in self.panels.values()),
+        ]
         self.appearance.start([self.actions_.set_theme, viewport.set_theme, self.hints.set_theme, *wearers])
         self._follow()
         self.resize(1440, 900)
@@ -123,6 +129,8 @@ class MainWindow(QMainWindow):
         self.arranging = Arranging(context)
         self.commands = Commands(context, self.tools)
         self.viewing = Viewing(context, self.tools.looking, settings)
+        self.cameras = Cameras(context, self.tools.looking, settings)
+        self.aids = ViewAids(context, viewport, self.tools.looking, self.viewing, self.cameras, settings)
         self.transfer = Transfer(context, self.ask, self.files.beside)
         self.importing = Importing(context, self.ask, settings, self.viewing.frame_all)
         self.canvas = CanvasChoice(viewport, settings, context.journal.write)
@@ -148,6 +156,8 @@ class MainWindow(QMainWindow):
             self.viewing,
             self.arranging,
             self.magnet,
+            self.cameras,
+            self.aids,
             self.appearance,
             self.layout_,
             self.palette_,
@@ -179,7 +189,7 @@ class MainWindow(QMainWindow):
         room = QWidget()
         room.setSizePolicy(room.sizePolicy().Policy.Expanding, room.sizePolicy().Policy.Preferred)
         bar.addWidget(room)
-        self.view_controls = ViewControls(self.context, self.commands)
+        self.view_controls = ViewControls(self.context, self.cameras)
         bar.addWidget(self.view_controls)
         self.addToolBar(bar)
 
@@ -190,12 +200,15 @@ class MainWindow(QMainWindow):
         self._autosave.start()
         self.files.opened.connect(self._opened)
         self.tools.tool_changed.connect(lambda _: self.following.soon())
+        self.cameras.changed.connect(self.following.soon)
         self.following.start(self.actions_)
+        self.aids.start()
         self.effects = Effects(self.preferences, self.context, self.files, self.quality, self.viewing)
         self.preferences_.dress_numbers()
 
     def _opened(self) -> None:
         self.tools.entered = None
+        self.cameras.adopt()
 
     def take_files(self, paths: list[Path]) -> None:
         """What dropping does."""
@@ -226,6 +239,8 @@ class MainWindow(QMainWindow):
         self.canvas.close()
         self.viewport.release()
         self._autosave.stop()
+        self.aids.close()
+        self.cameras.close()
         self.tools.close()
         self.context.feed.close()
         self.context.tasks.cancel()

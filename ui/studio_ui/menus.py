@@ -6,13 +6,12 @@ from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
 
-from PySide6.QtGui import QIcon, QPixmap
+from PySide6.QtGui import QAction, QIcon, QPixmap
 from PySide6.QtWidgets import QDockWidget, QMenu, QMenuBar
 
-from studio_core.scene.nodes import Camera
 from studio_ui.actions.action_set import ActionSet
-from studio_ui.commands import Commands
-from studio_ui.context import Context
+from studio_ui.cameras import Cameras
+from studio_ui.canvas.framing import CAMERA_KEYS
 from studio_ui.files.recent import folder_text, shared_names
 from studio_ui.project_files import ProjectFiles
 
@@ -24,19 +23,17 @@ class Menus:
         self,
         bar: QMenuBar,
         actions: ActionSet,
-        context: Context,
-        commands: Commands,
+        cameras: Cameras,
         files: ProjectFiles,
     ) -> None:
-        self._actions, self._context, self._commands = actions, context, commands
-        self._files = files
+        self._actions, self._cameras, self._files = actions, cameras, files
         actions.fill_menus(bar)
-        file, view = actions.menus["File"], actions.menus["View"]
+        file = actions.menus["File"]
         self.recent, self.samples = file.addMenu("Open recent"), file.addMenu("Open sample")
         for menu in (self.recent, self.samples):
             file.insertMenu(actions["file.save"], menu)
-        self.cameras = view.addMenu("Cameras")
-        view.insertMenu(actions["view.new_camera"], self.cameras)
+        self.cameras = actions.menus["View/Cameras"]
+        self._further: list[QAction] = []  # cameras that have no key
         self.recent.aboutToShow.connect(self.fill_recent)
         self.cameras.aboutToShow.connect(self.fill_cameras)
         self.recent.setToolTipsVisible(True)
@@ -61,7 +58,7 @@ class Menus:
         projects = self._files.recent.projects
         alike = shared_names(projects)
         for project in projects:
-            name = project.name.replace("&", "&&")
+            name = escaped(project.name)
             folder = f"  ({folder_text(project.path)})" if project.name in alike else ""
             entry = self.recent.addAction(f"{name}{folder}", partial(self._files.open, project.path))
             entry.setToolTip(str(project.path))
@@ -74,11 +71,26 @@ class Menus:
         _or_none(self.recent)
 
     def fill_cameras(self) -> None:
-        """The cameras of the scene."""
-        self.cameras.clear()
-        for camera in self._context.document.scene.of(Camera):
-            self.cameras.addAction(camera.name, partial(self._commands.look_through, camera.id))
-        _or_none(self.cameras)
+        """The cameras of the scene by name; the first ones have keys."""
+        for action in self._further:
+            self.cameras.removeAction(action)
+        self._further.clear()
+        found = self._cameras.all()
+        for number in range(1, CAMERA_KEYS + 1):
+            action = self._actions[f"view.camera_{number}"]
+            action.setVisible(number <= len(found))
+            action.setText(escaped(found[number - 1].name) if number <= len(found) else f"Camera {number}")
+        for camera in found[CAMERA_KEYS:]:
+            action = self.cameras.addAction(escaped(camera.name), partial(self._cameras.look, camera.id))
+            self._further.append(action)
+        if not found:
+            self._further.append(self.cameras.addAction("None yet"))
+            self._further[-1].setEnabled(False)
+
+
+def escaped(name: str) -> str:
+    """A name as a menu shows it."""
+    return name.replace("&", "&&")
 
 
 def _or_none(menu: QMenu) -> None:

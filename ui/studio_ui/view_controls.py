@@ -7,8 +7,7 @@ from PySide6.QtWidgets import QHBoxLayout, QLabel, QWidget
 
 from studio_core.kernels.tonemap import KINDS, LABELS
 from studio_core.params import ParamInfo
-from studio_core.scene.nodes import Camera
-from studio_ui.commands import Commands
+from studio_ui.cameras import Cameras
 from studio_ui.context import Context, Subscriptions
 from studio_ui.fields import Combo, NumberField
 from studio_ui.sinks import Sink
@@ -43,9 +42,9 @@ class _Exposure(Sink):
 class ViewControls(QWidget):
     """Camera, exposure, view transform."""
 
-    def __init__(self, context: Context, commands: Commands) -> None:
+    def __init__(self, context: Context, cameras: Cameras) -> None:
         super().__init__()
-        self._context, self._commands = context, commands
+        self._context, self._seen = context, cameras
         self.camera, self.transform = Combo(), Combo()
         self.camera.setToolTip("Look through a camera of the scene")
         self.camera.setMinimumWidth(120)
@@ -70,7 +69,7 @@ class ViewControls(QWidget):
         self._subscriptions = Subscriptions()
         self._subscriptions.add(
             context.document.changed.connect(lambda *_: self._cameras()),
-            context.session.changed.connect(lambda _: self._follow()),
+            cameras.changed.connect(self._cameras),
             context.session.displayed.connect(self._display),
         )
         self._cameras()
@@ -81,7 +80,7 @@ class ViewControls(QWidget):
         self._subscriptions.close()
 
     def _cameras(self) -> None:
-        found = [(camera.id, camera.name) for camera in self._context.document.scene.of(Camera)]
+        found = [(camera.id, camera.name) for camera in self._seen.all()]
         if found != self._known:
             self._known = found
             with QSignalBlocker(self.camera):
@@ -92,23 +91,18 @@ class ViewControls(QWidget):
         self._follow()
 
     def _follow(self) -> None:
-        """Which camera, if any, is where the view is."""
-        scene, view = self._context.document.scene, self._context.session.view
-        at = 0
-        for index, (node, _) in enumerate(self._known):
-            world = scene.world(node)
-            same = (world.translation, world.rotation) == (
-                view.transform.translation,
-                view.transform.rotation,
-            )
-            at = index + 1 if same else at
+        """Which camera, if any, is looked through."""
+        known = [node for node, _ in self._known]
+        at = known.index(self._seen.through) + 1 if self._seen.through in known else 0
         with QSignalBlocker(self.camera):
             self.camera.setCurrentIndex(at)
 
     def _look(self, index: int) -> None:
         node = self.camera.itemData(index)
         if node:
-            self._commands.look_through(node)
+            self._seen.look(node)
+        else:
+            self._seen.leave()
 
     def _display(self) -> None:
         session = self._context.session

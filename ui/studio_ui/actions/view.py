@@ -1,6 +1,7 @@
 """The View menu: where from, how bright, how it looks; computing."""
 
 from studio_ui.actions.spec import SEPARATOR, ActionSpec, Item
+from studio_ui.canvas.framing import ASPECTS, CAMERA_KEYS
 from studio_ui.canvas.presets import PRESETS, Preset
 
 
@@ -8,6 +9,26 @@ def _habit(preset: Preset) -> ActionSpec:
     name = f"navigation_{preset.id}"
     return ActionSpec(
         f"view.{name}", preset.label, "View/Navigation", "", preset.tip, group="navigation", checked=name
+    )
+
+
+def _camera(number: int) -> ActionSpec:
+    return ActionSpec(
+        f"view.camera_{number}",
+        f"Camera {number}",
+        "View/Cameras",
+        f"Ctrl+Alt+{number}",
+        "Look through it",
+        enabled=f"camera_{number}",
+        checked=f"through_{number}",
+    )
+
+
+def _frame(aspect: str) -> ActionSpec:
+    name = f"frame_{aspect.replace(':', '_').replace('.', '_')}"
+    tip = "Shape of the pictures that cameras make, width : height"
+    return ActionSpec(
+        f"view.{name}", ASPECTS[aspect][0], "View/Camera frame", "", tip, group="frame", checked=name
     )
 
 
@@ -27,11 +48,22 @@ ITEMS: tuple[Item, ...] = (
                "Towards the hand goes nearer", checked="invert_wheel"),
     ActionSpec("view.animate", "Animate the view", "View/Navigation", "",
                "Move smoothly to where the view is sent", checked="animate"),
-    ActionSpec("view.new_camera", "New camera from view", "View", "Ctrl+Alt+0", icon="camera"),
-    ActionSpec("view.aim_camera", "Set chosen camera to view", "View", enabled="camera"),
+    *(_camera(n) for n in range(1, CAMERA_KEYS + 1)),
+    ActionSpec("view.new_camera", "New camera from view", "View", "Ctrl+Alt+0", "Keep this view as a camera",
+               icon="camera"),
+    ActionSpec("view.aim_camera", "Set chosen camera to view", "View", "", "Put it where you look from",
+               enabled="aimable"),
+    ActionSpec("view.keep_camera", "Lock camera to view", "View", "",
+               "The camera you look through goes along when you look around", enabled="through",
+               checked="kept"),
+    ActionSpec("view.leave_camera", "Free view", "View", "", "Stay here without the camera",
+               enabled="through"),
+    *(_frame(name) for name in ASPECTS),
     SEPARATOR,
     ActionSpec("view.brighter", "Brighter", "View", "+", "Half an EV more exposure", canvas=True),
     ActionSpec("view.darker", "Darker", "View", "-", "Half an EV less exposure", canvas=True),
+    ActionSpec("view.cube", "View cube", "View", "",
+               "Which way one looks; click a side, an edge or a corner to look from there", checked="cube"),
     ActionSpec("view.grid", "Ground grid", "View", "G", "Lines on the ground: decimetres, metres, ten metres",
                canvas=True, checked="grid"),
     ActionSpec("view.canvas_auto", "Automatic", "View/Canvas", "", "The graphics card where there is one",

@@ -10,6 +10,7 @@ import numpy.typing as npt
 from studio_core.document import Document
 from studio_core.scene.nodes import Scene
 from studio_core.session import Session, View
+from studio_core.signal import Signal
 from studio_ui.canvas import navigation
 from studio_ui.canvas.flight import Flight
 from studio_ui.canvas.presets import LUCARNE, Preset
@@ -37,10 +38,13 @@ class Looking:
         self.preset: Preset = LUCARNE
         self.inverted = False
         """Whether the wheel goes the other way."""
+        self.cancelled: Signal[[]] = Signal()
+        """A drag was taken back; the view is about to be the one before it."""
         self.flight = Flight(session, feed)
         self._viewport, self._document, self._session, self._feed = viewport, document, session, feed
         self._pivot: F64 | None = None
         self._last: Pointer | None = None
+        self._before = session.view
         self._anchor: F64 | None = None  # where the last steps of wheel or fingers led
         self._at: tuple[Pointer, View, Scene] | None = None  # what that holds for
         self._off = [viewport.scroll.connect(self.scroll), viewport.pinch.connect(self.pinch)]
@@ -69,7 +73,7 @@ class Looking:
         """A drag begins, where the button was pressed; it goes around `pivot`, or what is meant there."""
         self.end()
         self.flight.stop()
-        self.mode, self._last = mode, press
+        self.mode, self._last, self._before = mode, press, self._session.view
         self._pivot = self._meant(mode, press) if pivot is None else pivot
         self._feed.hold()
 
@@ -87,6 +91,14 @@ class Looking:
         if self.mode is not None:
             self.mode = self._last = self._pivot = None
             self._feed.release()
+
+    def cancel(self) -> None:
+        """Take the drag back."""
+        if self.mode is not None:
+            now, before = self._session.view, self._before
+            self.cancelled.emit()
+            self._session.look(before.sized(now.width, now.height))
+            self.end()
 
     def wheel(self, pointer: Pointer, steps: float) -> None:
         """Towards what is under the mouse, or away from it; its place in the picture stays."""

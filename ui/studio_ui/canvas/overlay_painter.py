@@ -70,7 +70,7 @@ def paint_message(painter: QPainter, size: QSizeF, text: str, theme: Theme) -> N
 
 
 def paint_badge(painter: QPainter, size: QSizeF, state: Freshness, theme: Theme) -> None:
-    """A small mark in the corner unless the picture is up to date."""
+    """A small mark in the lower right corner unless the picture is up to date."""
     colours = {
         Freshness.STALE: theme.accent,
         Freshness.REFINING: "#8fb8d8",
@@ -80,7 +80,7 @@ def paint_badge(painter: QPainter, size: QSizeF, state: Freshness, theme: Theme)
         return
     painter.setRenderHint(QPainter.RenderHint.Antialiasing)
     width = painter.fontMetrics().horizontalAdvance(state.value) + 34
-    box = QRectF(size.width() - width - 12, 12, width, 24)
+    box = QRectF(size.width() - width - 12, size.height() - 36, width, 24)
     painter.setPen(Qt.PenStyle.NoPen)
     painter.setBrush(_GROUND)
     painter.drawRoundedRect(box, 12, 12)

@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from PySide6.QtGui import QImage
+from PySide6.QtCore import QRect
+from PySide6.QtGui import QImage, QResizeEvent
 from PySide6.QtWidgets import QVBoxLayout, QWidget
 
 from studio_core.scene.nodes import NodeId, Scene
@@ -38,6 +39,7 @@ class SwitchViewport(QWidget):
         self.resized: Signal[[int, int]] = Signal()
         self._told: dict[str, tuple[Any, ...]] = {}
         self._off: list[Callable[[], None]] = []
+        self._above: list[tuple[QWidget, Callable[[QRect], QRect]]] = []
         layout = QVBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
         self._layout = layout
@@ -61,6 +63,19 @@ class SwitchViewport(QWidget):
         old.widget.hide()
         old.widget.deleteLater()
 
+    def lay_over(self, widget: QWidget, place: Callable[[QRect], QRect]) -> None:
+        """Keep a widget above whatever canvas there is, where `place` says for the canvas' rectangle."""
+        widget.setParent(self)
+        self._above.append((widget, place))
+        widget.setGeometry(place(self.rect()))
+        widget.raise_()
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        """What lies above goes along."""
+        super().resizeEvent(event)
+        for widget, place in self._above:
+            widget.setGeometry(place(self.rect()))
+
     def release(self) -> None:
         """Give everything back."""
         self.inner.release()
@@ -72,6 +87,8 @@ class SwitchViewport(QWidget):
         self._layout.addWidget(viewport.widget)
         self.setFocusProxy(viewport.widget)
         viewport.widget.show()
+        for widget, _ in self._above:
+            widget.raise_()
 
     def _tell(self, name: str, *values: Any) -> None:
         self._told[name] = values

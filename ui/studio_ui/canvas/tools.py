@@ -126,6 +126,11 @@ class CanvasTools:
         if self.holding.active:
             self.holding.cancel()
             return True
+        if self._mode == "look":
+            self._mode = ""
+            self.looking.cancel()
+            self.refresh()
+            return True
         if self._editing.cancel_any():
             return True
         if self._mode == "band" or self._banding:
