@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from studio_core.edits import Move
 from studio_core.scene.arranging import shifted
-from studio_core.scene.bounds import exact_bounds, mesh_box
+from studio_core.scene.bounds import exact_bounds, mesh_box, rows_in_world
 from studio_core.scene.nodes import MeshObject, NodeId, Scene
 from studio_core.scene.transform import Transform
 
@@ -44,25 +44,24 @@ class _Mesh:
         self.id = node.id
         self.low, self.high = mesh_box(scene, node.id)
         self._scene, self._node = scene, node
-        self._points: F64 | None = None
+        self._rows: F64 | None = None
         self._flat: F32 | None = None
         self._seen: tuple[bytes, F32] | None = None
 
-    def points(self) -> F64:
-        """(P, 3) in the world."""
-        if self._points is None:
-            matrix = self._scene.world(self.id).matrix()
-            self._points = self._node.geometry.positions @ matrix[:3, :3].T + matrix[:3, 3]
-        return self._points
+    def rows(self) -> F64:
+        """(3, P) x, y and z of all corners in the world."""
+        if self._rows is None:
+            self._rows = rows_in_world(self._node.geometry.positions, self._scene.world(self.id).matrix())
+        return self._rows
 
     def triangles(self, which: npt.NDArray[np.bool_]) -> F64:
         """(N, 3, 3) corners in the world of some of the faces (F,)."""
-        return self.points()[self._node.geometry.faces[which]]
+        return np.moveaxis(self.rows()[:, self._node.geometry.faces[which]], 0, -1)
 
     def below(self, points: F64) -> F64:
         """(N,) height of the highest level surface at most as high as each point (N, 3); -inf without one."""
         if self._flat is None:
-            x, _, z = self.points().T.astype(np.float32)
+            x, _, z = self.rows().astype(np.float32)
             self._flat = _boxes(self._node.geometry.faces, x, z)
         least, greatest = points.min(axis=0), points.max(axis=0)
         x0, z0, x1, z1 = self._flat
@@ -96,8 +95,8 @@ class _Mesh:
         """(4, F) boxes of the triangles, each projected to the plane below the start."""
         key = start.tobytes()
         if self._seen is None or self._seen[0] != key:
-            across, deep, along = (self.points() - start).T
-            deep = -deep
+            x, y, z = self.rows()
+            across, deep, along = x - start[0], start[1] - y, z - start[2]
             faces, above = self._node.geometry.faces, deep < 1e-6 * (1 + float(np.abs(deep).max()))
             with np.errstate(all="ignore"):
                 boxes = _boxes(faces, (across / deep).astype(np.float32), (along / deep).astype(np.float32))
