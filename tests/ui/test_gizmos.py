@@ -14,9 +14,10 @@ from ui_support import room
 from studio_core.edits import Add, Move, duplicate
 from studio_core.scene.bounds import exact_bounds
 from studio_core.scene.nodes import PointLamp, Scene
+from studio_core.scene.room import Room
 from studio_core.scene.transform import Transform, axis_angle, looking
 from studio_core.session import View
-from studio_ui.canvas.drags import CopyDrag, Hold, called
+from studio_ui.canvas.drags import CopyDrag, Hold, Words, called
 from studio_ui.canvas.gizmos import ARM, Frame, Gizmo, Handle, metres_per_pixel
 from studio_ui.canvas.moving import MoveDrag, on_axis, on_plane
 from studio_ui.canvas.projection import axes_of, eye_of, project
@@ -257,6 +258,20 @@ def test_what_surrounds_a_thing_counts_by_its_parts() -> None:
     assert Neighbours(room(), ("chair",)).names == ["Stool"]
 
 
+def test_furniture_meets_a_rooms_walls_from_inside() -> None:
+    materials = ("blue",) * 5
+    walls = Room(id="walls", name="Walls", materials=materials, width=6.0, depth=4.0, thickness=0.3)
+    neighbours = Neighbours(Add((walls,))(room()), ("stool",))
+    assert set(neighbours.names) == {"Walls", "Chair"}
+    made, met = neighbours.snapped((1.48, 0.0, -1.53), (0, 2), Pull(0.05))
+    assert made == pytest.approx((1.5, 0.0, -1.5))
+    assert {(one.axis, one.at) for one in met} == {(0, 3.0), (2, -2.0)}
+    turned = Add((dataclasses.replace(walls, transform=Transform(rotation=axis_angle((0, 1, 0), 30))),))(
+        room()
+    )
+    assert "Walls" in Neighbours(turned, ("stool",)).names
+
+
 @given(st.floats(-1000, 1000), st.sampled_from([0.0, 0.05, 15.0]))
 def test_rounding_twice_is_rounding_once(value: float, step: float) -> None:
     assert rounded(rounded(value, step), step) == pytest.approx(rounded(value, step))
@@ -336,6 +351,14 @@ def test_a_typed_distance_goes_the_way_of_the_hand() -> None:
     delta = moved(held, drag.edit(held.press))
     assert delta == pytest.approx((1.2, 0.0, 1.6), abs=1e-5)
     assert drag.label == "Move Stool 2 m"
+
+
+def test_amounts_are_told_in_a_persons_unit() -> None:
+    assert [Words().length(m) for m in (1.25, 0.8, -0.003)] == ["1.25 m", "80 cm", "-3 mm"]
+    assert Words("mm", ",").length(1.2338) == "1234 mm"
+    assert Words("cm", ",").length(1.2348) == "123,5 cm"
+    assert Words("ft-in").length(0.762) == "2'6\""
+    assert Words(mark=",").angle(12.5) == "12,5°"
 
 
 def test_typing() -> None:

@@ -13,6 +13,7 @@ from studio_core.scene.transform import Transform
 from studio_ui.canvas.gizmos import Handle
 from studio_ui.canvas.overlay import Band, Label
 from studio_ui.canvas.projection import project
+from studio_ui.number_style import NumberStyle, set_number_style
 
 CHAIR, STOOL = (-1.0, 0.5, 0.5), (1.0, 0.5, 0.5)  # points on the front faces
 NONE, SHIFT, CTRL, ALT = (
@@ -283,6 +284,21 @@ def test_what_is_hidden_behind_another_is_not_caught(driver: Driver) -> None:
     assert driver.labels()[-1] == "Add", "one band only: this looked around"
 
 
+def test_esc_looks_from_where_it_was_looked(driver: Driver) -> None:
+    view = driver.session.view
+    driver.viewport.setFocus()
+    at = QPoint(200, 200)
+    driver.press(at, NONE, Qt.MouseButton.MiddleButton)
+    driver.move(at + QPoint(80, 20))
+    assert driver.session.view != view
+    driver.bot.keyClick(driver.viewport, Qt.Key.Key_Escape)
+    assert driver.session.view == view
+    driver.move(at + QPoint(120, 30))
+    driver.release(at + QPoint(120, 30), NONE, Qt.MouseButton.MiddleButton)
+    assert driver.session.view == view
+    driver.settle()
+
+
 def test_esc_drops_a_band(driver: Driver) -> None:
     driver.do("tool.select")
     driver.viewport.setFocus()
@@ -328,6 +344,15 @@ def test_duplicating_with_own_materials(driver: Driver) -> None:
     (copy,) = driver.session.selection
     assert driver.document.scene[copy].materials[0] not in ("blue", own)
     assert driver.document.scene[copy].geometry is driver.document.scene["stool"].geometry
+
+
+def test_lengths_are_told_and_typed_in_the_windows_unit(driver: Driver) -> None:
+    set_number_style(driver.window, NumberStyle("cm", ","))
+    choose(driver, "stool")
+    press_keys(driver, "x140,5")
+    driver.bot.keyClick(driver.viewport, Qt.Key.Key_Return)
+    assert place(driver)[0] == pytest.approx(2.405)
+    assert driver.labels()[-1] == "Move Stool 140,5 cm along X"
 
 
 def test_the_magnet_is_switched_and_remembered(driver: Driver) -> None:

@@ -39,7 +39,7 @@ ITEMS: tuple[Item, ...] = (
     ActionSpec("snap.on", "Snap", "Object/Snap", "M",
                "Things you drag are drawn to places that fit; hold Ctrl for the opposite",
                icon="magnet", bar=True, checked="snap_on", canvas=True),
-    ActionSpec("snap.grid", "To steps", "Object/Snap", "", "Multiples of 5 cm, 15° and 5 %",
+    ActionSpec("snap.grid", "To steps", "Object/Snap", "", "Steps of length and angle (Preferences)",
                checked="snap_grid"),
     ActionSpec("snap.objects", "To other things", "Object/Snap", "", "Sides and middles of what is near",
                checked="snap_objects"),

@@ -16,6 +16,7 @@ from studio_core.edits import Add, Compound, Edit, SetFields
 from studio_core.quantities import format_quantity
 from studio_core.scene.nodes import Environment, NodeId, Scene
 from studio_core.session import View
+from studio_core.units import LENGTH_UNITS
 from studio_ui.canvas.gizmos import COLOURS, Frame
 from studio_ui.canvas.overlay import Overlay, Wires
 from studio_ui.canvas.projection import bounds
@@ -24,6 +25,29 @@ from studio_ui.canvas.viewport import Pointer
 
 F64 = npt.NDArray[np.float64]
 _LINE = 50.0  # metres to either side that an axis is drawn
+
+
+@dataclass(frozen=True)
+class Words:
+    """How amounts are told: the unit of lengths (as `LENGTH_UNITS`), the decimal mark."""
+
+    unit: str = "m"
+    mark: str = "."
+
+    def length(self, metres: float) -> str:
+        """`80 cm`, `1.25 m`, `-3 mm`, `2'7.5"`."""
+        shown, decimals = self.unit, LENGTH_UNITS[self.unit].decimals
+        if shown == "m" and abs(metres) < 1:
+            shown, decimals = ("cm", 1) if abs(metres) >= 0.01 or not metres else ("mm", 1)
+        return format_quantity(metres, "m", shown, decimals, mark=self.mark)
+
+    def angle(self, degrees: float) -> str:
+        """`15°`, `-2.5°`."""
+        return format_quantity(degrees, "°", decimals=1, mark=self.mark)
+
+    def factor(self, factor: float) -> str:
+        """`120%`."""
+        return format_quantity(factor, "", "%", 1, mark=self.mark)
 
 
 class Drag(Protocol):
@@ -75,6 +99,7 @@ class Hold:
     copies: bool = False
     world_axes: bool = True
     called: str = ""
+    words: Words = Words()
 
     def title(self, verb: str) -> str:
         """`Move Chair`, `Copy 3 objects`."""
@@ -147,7 +172,7 @@ class LightDrag:
 
     def told(self) -> str:
         """The angle."""
-        return angle_words(self._turned)
+        return Words().angle(self._turned)
 
     def marks(self) -> Overlay:
         """Nothing: the light is seen."""
@@ -162,18 +187,6 @@ def named(scene: Scene, nodes: tuple[NodeId, ...], verb: str) -> str:
 def called(scene: Scene, nodes: tuple[NodeId, ...]) -> str:
     """`Chair`, `3 objects`."""
     return scene[nodes[0]].name if len(nodes) == 1 else f"{len(nodes)} objects"
-
-
-def length_words(metres: float) -> str:
-    """`80 cm`, `1.25 m`, `-3 mm`."""
-    if abs(metres) >= 1:
-        return format_quantity(metres, "m", decimals=3)
-    return format_quantity(metres, "m", "cm", 1 if abs(metres) >= 0.1 else 2)
-
-
-def angle_words(degrees: float) -> str:
-    """`15°`, `-2.5°`."""
-    return format_quantity(degrees, "°", decimals=1)
 
 
 def middle(scene: Scene, nodes: Iterable[NodeId]) -> F64:

@@ -144,7 +144,8 @@ class Holding:
 
     def _type(self, drag: Drag, name: str) -> None:
         if self._typed is None:
-            self._typed = Typed(drag.unit or "")
+            lengths = self._hold.words.unit if self._hold is not None and drag.unit == "m" else None
+            self._typed = Typed(drag.unit or "", lengths)
         if name in LETTERS or name == "backspace":
             self._typed.take(name)
         if not self._typed.text:

@@ -11,7 +11,7 @@ from studio_core.scene.bounds import exact_bounds
 from studio_core.scene.nodes import NodeId, Scene
 from studio_core.scene.standing import Ground, Seat
 from studio_core.session import View
-from studio_ui.canvas.drags import Hold, length_words
+from studio_ui.canvas.drags import Hold
 from studio_ui.canvas.gizmos import NAMES, Frame, Handle, metres_per_pixel
 from studio_ui.canvas.overlay import Overlay
 from studio_ui.canvas.projection import axes_of, extent, eye_of, ray
@@ -73,20 +73,24 @@ class MoveDrag:
             return title
         if self._kind == "axis" and self._handle is not None:
             own = "" if self._hold.world_axes else "its "
-            return f"{title} {length_words(self._along())} along {own}{NAMES[self._handle.axis]}"
-        return f"{title} {length_words(float(np.linalg.norm(self._delta)))}"
+            return f"{title} {self._hold.words.length(self._along())} along {own}{NAMES[self._handle.axis]}"
+        return f"{title} {self._hold.words.length(float(np.linalg.norm(self._delta)))}"
 
     def told(self) -> str:
         """The distance, by axis where there is one."""
         if self._kind == "axis" and self._handle is not None:
-            return f"{NAMES[self._handle.axis]} {length_words(self._along())}"
+            return f"{NAMES[self._handle.axis]} {self._hold.words.length(self._along())}"
         if self._kind == "floor" and self._vertical and abs(self._delta[1]) > 0:
-            return f"Y {length_words(float(self._delta[1]))}"
+            return f"Y {self._hold.words.length(float(self._delta[1]))}"
         if self._kind == "plane" and self._handle is not None:
             parts = self._hold.frame.axes @ self._delta
-            told = [f"{NAMES[i]} {length_words(float(parts[i]))}" for i in range(3) if i != self._handle.axis]
+            told = [
+                f"{NAMES[i]} {self._hold.words.length(float(parts[i]))}"
+                for i in range(3)
+                if i != self._handle.axis
+            ]
             return "   ".join(told)
-        return length_words(float(np.linalg.norm(self._delta)))
+        return self._hold.words.length(float(np.linalg.norm(self._delta)))
 
     def type(self, amount: float | None) -> None:
         """Metres along the axis, or the way that the hand went."""
@@ -109,7 +113,7 @@ class MoveDrag:
         made = Overlay()
         if self._kind == "axis" and self._handle is not None:
             made += self._hold.axis_line(self._handle.axis)
-        return made + self._neighbours.guides(self._delta, self._met, length_words)
+        return made + self._neighbours.guides(self._delta, self._met, self._hold.words.length)
 
     def edit(self, pointer: Pointer) -> Move:
         """The nodes where the mouse, or what was typed, wants them."""

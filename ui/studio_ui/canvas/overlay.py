@@ -62,11 +62,15 @@ class Label:
 
 @dataclass(frozen=True, eq=False)
 class Band:
-    """A rectangle on the canvas, corners (x, y) in 0…1 from the top left: what a box selection has caught."""
+    """A rectangle on the canvas, corners (x, y) in 0…1 from the top left: what a box selection has caught.
+
+    With a full line where only what lies inside `whole` counts.
+    """
 
     start: tuple[float, float]
     end: tuple[float, float]
     colour: str = "accent"
+    whole: bool = False
 
 
 Mark = Wires | Dot | Face | Label | Band

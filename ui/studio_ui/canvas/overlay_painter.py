@@ -51,7 +51,7 @@ def paint_overlay(painter: QPainter, size: QSizeF, view: View, overlay: Overlay,
                 _words(painter, QPointF(*spot), mark.text, tint)
         elif isinstance(mark, Band):
             box = QRectF(QPointF(*np.multiply(mark.start, scale)), QPointF(*np.multiply(mark.end, scale)))
-            painter.setPen(QPen(tint, 1, Qt.PenStyle.DashLine))
+            painter.setPen(QPen(tint, 1, Qt.PenStyle.SolidLine if mark.whole else Qt.PenStyle.DashLine))
             tint.setAlphaF(0.12)
             painter.setBrush(tint)
             painter.drawRect(box.normalized())

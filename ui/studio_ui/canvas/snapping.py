@@ -12,8 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from studio_core.scene.bounds import exact_bounds
+from studio_core.scene.bounds import exact_bounds, rows_in_world
 from studio_core.scene.nodes import MeshObject, NodeId, Scene
+from studio_core.scene.room import Room
 from studio_ui.canvas.overlay import Dot, Label, Mark, Overlay, Wires
 
 F64 = npt.NDArray[np.float64]
@@ -169,6 +170,10 @@ def _others(scene: Scene, moving: Sequence[NodeId], box: F64) -> list[tuple[Node
         node = queue.pop()
         if node in moving or not scene.shown(node):
             continue
+        room = _room_inside(scene, node)
+        if room is not None:
+            found.append((node, room))
+            continue
         has_mesh = any(isinstance(scene[below], MeshObject) for below in scene.subtree(node))
         around = exact_bounds(scene, (node,)) if has_mesh else None
         if around is None:
@@ -180,6 +185,20 @@ def _others(scene: Scene, moving: Sequence[NodeId], box: F64) -> list[tuple[Node
         elif node not in own:
             found.append((node, np.stack(around)))
     return found
+
+
+def _room_inside(scene: Scene, node: NodeId) -> F64 | None:
+    """(2, 3) between the walls, floor and ceiling of a room that stands straight; None for anything else."""
+    made = scene[node]
+    if not isinstance(made, Room):
+        return None
+    world = scene.world(node).matrix()
+    turn = np.abs(world[:3, :3])
+    if (turn > 1e-9 * turn.max()).sum() != 3:
+        return None
+    half = (made.width / 2, made.depth / 2)
+    ends = rows_in_world(np.array([(-half[0], 0.0, -half[1]), (half[0], made.height, half[1])]), world)
+    return np.stack([ends.min(axis=1), ends.max(axis=1)])
 
 
 def _guide(met: Met, moved: F64, other: F64, name: str, words: Callable[[float], str]) -> list[Mark]:

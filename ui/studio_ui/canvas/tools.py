@@ -17,7 +17,7 @@ from studio_core.scene.diff import Changes
 from studio_core.scene.nodes import Environment, NodeId, Scene
 from studio_core.session import Session
 from studio_core.signal import Signal
-from studio_ui.canvas.drags import Hold, LightDrag, called
+from studio_ui.canvas.drags import Hold, LightDrag, Words, called
 from studio_ui.canvas.gizmos import Frame, Gizmo, Handle, meaning
 from studio_ui.canvas.glyphs import glyphs
 from studio_ui.canvas.holding import AXES, Holding
@@ -29,6 +29,7 @@ from studio_ui.canvas.viewport import Pointer, Viewport
 from studio_ui.editing import Editing
 from studio_ui.feed import PictureFeed
 from studio_ui.magnet import Magnet
+from studio_ui.number_style import number_style
 
 CLICK = 4.0  # logical pixels that a click may slip
 TOOLS = ("select", "move", "rotate", "scale")
@@ -59,6 +60,7 @@ class CanvasTools:
         self._mode = ""  # "", click, look, hold, band
         self._lit: Handle | None = None  # under the mouse, or pressed
         self._banding = False  # the next drag draws a band
+        self._before = session.view  # when looking around began
         self._placed: tuple[object, Frame | None] | None = None
         viewport.want_keys(self._wants)
         self._off = [
@@ -122,7 +124,7 @@ class CanvasTools:
         return Gizmo(self.tool, frame, self._session.view, self._size())
 
     def cancel(self) -> bool:
-        """Esc: put back what is held, drop the band, leave the entered group, or choose nothing."""
+        """Esc: put back what is held or looked at, drop the band, leave the group, or choose nothing."""
         if self.holding.active:
             self.holding.cancel()
             return True
@@ -132,6 +134,11 @@ class CanvasTools:
             self.refresh()
             return True
         if self._editing.cancel_any():
+            return True
+        if self._mode == "look":
+            self._mode = ""
+            self.looking.end()
+            self._session.look(self._before)
             return True
         if self._mode == "band" or self._banding:
             self._mode, self._banding = "", False
@@ -221,7 +228,7 @@ class CanvasTools:
         elif press.button == "left" and not press.alt and (self._bands() or looks is None):
             self._mode = "band"
         elif looks is not None:
-            self._mode = "look"
+            self._mode, self._before = "look", self._session.view
             self.looking.start(looks, press)
         else:
             self._mode = ""
@@ -255,6 +262,7 @@ class CanvasTools:
         nodes = roots(scene, self._session.selection)
         if frame is None or not nodes:
             return None
+        style = number_style(self._viewport.widget)
         return Hold(
             scene,
             nodes,
@@ -266,6 +274,7 @@ class CanvasTools:
             press.alt,
             not self._magnet.local_axes,
             called(scene, nodes),
+            Words(style.length, style.decimal_mark),
         )
 
     def _released(self, pointer: Pointer) -> None:
@@ -352,7 +361,7 @@ class CanvasTools:
     def _overlay(self) -> Overlay:
         if self._mode == "band" and self._press is not None:
             start, end = (self._press.x, self._press.y), (self._last.x, self._last.y)
-            return Overlay((Band(start, end),))
+            return Overlay((Band(start, end, whole=end[0] >= start[0]),))
         gizmo = self.gizmo()
         if self.holding.active:
             return self.holding.marks(gizmo)

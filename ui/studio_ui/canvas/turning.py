@@ -6,10 +6,9 @@ import numpy as np
 import numpy.typing as npt
 
 from studio_core.edits import Move
-from studio_core.quantities import format_quantity
 from studio_core.scene.arranging import scaled, turned
 from studio_core.session import View
-from studio_ui.canvas.drags import Hold, angle_words
+from studio_ui.canvas.drags import Hold
 from studio_ui.canvas.gizmos import NAMES, Frame, Handle
 from studio_ui.canvas.moving import on_plane
 from studio_ui.canvas.overlay import Overlay, Wires
@@ -51,13 +50,13 @@ class TurnDrag:
             about = "" if self._handle.axis == 1 and not own else f" about {own}{NAMES[self._handle.axis]}"
         elif self._handle is not None:
             about = " about the line of sight"
-        return f"{title} {angle_words(self._degrees)}{about}"
+        return f"{title} {self._hold.words.angle(self._degrees)}{about}"
 
     def told(self) -> str:
         """The angle."""
         ring = self._handle is not None and self._handle.kind == "ring"
         name = f"{NAMES[self._handle.axis]} " if ring and self._handle is not None else ""
-        return f"{name}{angle_words(self._degrees)}"
+        return f"{name}{self._hold.words.angle(self._degrees)}"
 
     def type(self, amount: float | None) -> None:
         """Degrees, right-handed about the axis."""
@@ -141,7 +140,7 @@ class SizeDrag:
 
     def told(self) -> str:
         """The factor as a percentage."""
-        return format_quantity(self._factor, "", "%", 1)
+        return self._hold.words.factor(self._factor)
 
     def type(self, amount: float | None) -> None:
         """A factor; `120%` is 1.2."""
