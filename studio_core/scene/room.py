@@ -8,7 +8,16 @@ from studio_core.params import param
 from studio_core.scene.geometry import Geometry
 from studio_core.scene.nodes import MeshObject
 from studio_core.scene.room_mesh import room_geometry
-from studio_core.scene.room_shape import RECTANGLE, Opening, Placed, Point, RoomShape, rectangle, stretched
+from studio_core.scene.room_shape import (
+    FARTHEST,
+    RECTANGLE,
+    Opening,
+    Placed,
+    Point,
+    RoomShape,
+    rectangle,
+    stretched,
+)
 
 SLOTS = ("Floor", "Walls", "Ceiling", "Skirting", "Frames")
 """What the materials of a room are for, in their order."""
@@ -25,15 +34,15 @@ class Room(MeshObject):
     """
 
     geometry: Geometry = field(init=False, repr=False)
-    width: float = param(5.0, "Width", "From wall to wall, inside", unit="m", low=0.5, high=100.0)
-    depth: float = param(4.0, "Depth", "From front to back, inside", unit="m", low=0.5, high=100.0)
-    height: float = param(2.6, "Height", "From floor to ceiling", unit="m", low=0.5, high=50.0)
+    width: float = param(5.0, "Width", "From wall to wall, inside", unit="m", low=0.5, high=FARTHEST)
+    depth: float = param(4.0, "Depth", "From front to back, inside", unit="m", low=0.5, high=FARTHEST)
+    height: float = param(2.6, "Height", "From floor to ceiling", unit="m", low=0.5, high=FARTHEST)
     thickness: float = param(
-        0.2, "Wall thickness", "Outwards: the room keeps its size", unit="m", low=0.02, high=2.0
+        0.2, "Wall thickness", "Outwards: the room keeps its size", unit="m", low=0.02, high=1.0
     )
     ceiling: bool = param(True, "Ceiling", "Closes the room above")
     skirting: float = param(
-        0.08, "Skirting", "Height of the board along the walls; 0 for none", unit="m", low=0.0, high=1.0
+        0.08, "Skirting", "Height of the board along the walls; 0 for none", unit="m", low=0.0, high=0.5
     )
     plan: tuple[Point, ...] = ()
     without: tuple[int, ...] = ()

@@ -15,7 +15,7 @@ from typing import Literal, get_args
 import numpy as np
 import numpy.typing as npt
 
-from studio_core.params import param
+from studio_core.params import param, param_infos
 from studio_core.scene.polygon import area, clearance
 
 Point = tuple[float, float]
@@ -23,6 +23,7 @@ OpeningKind = Literal["window", "door", "opening"]
 KINDS: tuple[str, ...] = get_args(OpeningKind)
 RECTANGLE = ("Back", "Right", "Front", "Left")
 MOST_WALLS, MOST_OPENINGS = 64, 100
+FARTHEST = 300.0  # metres: a hall
 SLAB = 0.1  # metres: floor and ceiling
 PROUD = 0.015  # metres that a skirting stands out
 MARGIN = 0.02  # metres of wall left beside and above openings
@@ -47,26 +48,23 @@ class Opening:
     kind: OpeningKind = "window"
     wall: int = 0
     along: float = param(
-        0.0, "Along", "Middle, to the right of the wall's middle", unit="m", low=-1e3, high=1e3
+        0.0, "Along", "Middle, to the right of the wall's middle", unit="m", low=-FARTHEST, high=FARTHEST
     )
-    sill: float = param(0.9, "Sill", "Height of the lower edge", unit="m", low=0.0, high=100.0)
-    width: float = param(1.2, "Width", unit="m", low=LEAST, high=1e3)
-    height: float = param(1.4, "Height", unit="m", low=LEAST, high=100.0)
+    sill: float = param(0.9, "Sill", "Height of the lower edge", unit="m", low=0.0, high=FARTHEST)
+    width: float = param(1.2, "Width", unit="m", low=LEAST, high=FARTHEST)
+    height: float = param(1.4, "Height", unit="m", low=LEAST, high=FARTHEST)
 
     def __post_init__(self) -> None:
         if self.kind not in KINDS:
             raise ValueError(f"{self.kind!r} is no kind of opening: choose one of {', '.join(KINDS)}")
         if not isinstance(self.wall, int) or isinstance(self.wall, bool) or not 0 <= self.wall < MOST_WALLS:
             raise ValueError(f"an opening's wall is a number from 0 to {MOST_WALLS - 1}, not {self.wall!r}")
-        for name, low, high in (
-            ("along", -1e3, 1e3),
-            ("sill", 0.0, 100.0),
-            ("width", LEAST, 1e3),
-            ("height", LEAST, 100.0),
-        ):
+        for name, info in param_infos(type(self)).items():
             value = getattr(self, name)
-            if not isinstance(value, int | float) or not low <= value <= high:  # NaN fits nowhere
-                raise ValueError(f"a {self.kind}'s {name} of {value!r} m does not fit: {low:g} to {high:g}")
+            if not isinstance(value, int | float) or not info.low <= value <= info.high:  # NaN fits nowhere
+                raise ValueError(
+                    f"a {self.kind}'s {name} of {value!r} m does not fit: {info.low:g} to {info.high:g}"
+                )
             object.__setattr__(self, name, float(value))
 
 

@@ -86,7 +86,7 @@ def test_a_camera_of_one_s_own_is_the_only_one() -> None:
     ("arguments", "told"),
     [
         (("--room", "5x4"), "write WIDTHxDEPTHxHEIGHT in metres"),
-        (("--room", "5x4x0"), r"height = 0.0 does not fit: expected 0.5 to 50 m"),
+        (("--room", "5x4x0"), r"height = 0.0 does not fit: expected 0.5 to 300 m"),
         (("--room", "5x4x1.2.3"), "'1.2.3' is no number"),
         (("--room", "5x4x2-5x1"), "must be smaller than the room"),
         (("--room", "5x4x2.6", "--floor", "3"), "a floor of its own"),

@@ -208,4 +208,4 @@ def test_sizes_out_of_range_are_brought_into_it_when_read() -> None:
 
     read = codec.Inward(refuse).item(value, "an item")
     assert isinstance(read, Room)
-    assert (read.width, read.openings[0].sill, read.openings[0].width) == (100.0, 0.0, 0.1)
+    assert (read.width, read.openings[0].sill, read.openings[0].width) == (300.0, 0.0, 0.1)

@@ -46,6 +46,7 @@ from studio_ui.preferences.feature import PreferencesFeature
 from studio_ui.preferences.store import Preferences
 from studio_ui.project_files import ProjectFiles
 from studio_ui.quality import QualityControl
+from studio_ui.rooms import Rooms
 from studio_ui.settings import Settings
 from studio_ui.shortcuts import Shortcuts
 from studio_ui.status import StatusBar
@@ -165,6 +166,7 @@ class MainWindow(QMainWindow):
             Choosing(context),
             ConsoleDoor(self.panels["console"], self.docks["console"]),
             Help(self, context.host, self.shortcuts, self.viewing.mouse),
+            Rooms(context, self.status.say),
         ]
 
     def _panels(self) -> list[tuple[Panel, Qt.DockWidgetArea]]:

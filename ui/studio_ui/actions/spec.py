@@ -49,6 +49,7 @@ REASONS = {
     "through": "No camera is looked through",
     **{f"camera_{n}": "There are fewer cameras" for n in range(1, 10)},
     "group": "No group is chosen",
+    "room": "There is no room",
     "savable": "Nothing has changed since it was saved",
     "correctable": "No object is chosen",
     "has_file": "The project is in no file yet",

@@ -14,10 +14,12 @@ from studio_core.scene.nodes import (
     PointLamp,
     SpotLamp,
 )
+from studio_core.scene.room import Room
 
 KINDS: dict[type[Node], tuple[str, str, str]] = {
     Group: ("group", "Group", "groups"),
     MeshObject: ("object", "Object", "objects"),
+    Room: ("room", "Room", "rooms"),
     Camera: ("camera", "Camera", "cameras"),
     Environment: ("environment", "Environment", "environments"),
     PointLamp: ("lamp", "Point lamp", "point lamps"),

@@ -9,6 +9,7 @@ from studio_core.edits import Assign, Compound
 from studio_core.params import ParamInfo, param_infos
 from studio_core.scene.diff import Changes
 from studio_core.scene.nodes import Environment, MaterialId, MeshObject, Node, NodeId, Scene
+from studio_core.scene.room import SLOTS, Room
 from studio_ui.context import Context
 from studio_ui.fields import Combo
 from studio_ui.node_sink import NodeSink
@@ -16,6 +17,7 @@ from studio_ui.panels.light_form import NodeForm, shared_values
 from studio_ui.panels.node_kinds import kinds_name
 from studio_ui.panels.panel import Panel, clear, heading, note
 from studio_ui.panels.place import PlaceEditor
+from studio_ui.panels.room_form import RoomForm
 from studio_ui.param_form import ParamForm, form_label, form_layout
 from studio_ui.spin import MIXED
 
@@ -36,6 +38,7 @@ class PropertiesPanel(Panel):
         self.form: NodeForm | None = None
         self.flags: ParamForm | None = None
         self.place: PlaceEditor | None = None
+        self.room: RoomForm | None = None
         self.slots: list[Combo] = []
         self._built: object = self
         self._column = self.scroller()
@@ -72,7 +75,7 @@ class PropertiesPanel(Panel):
     def _build(self, scene: Scene, nodes: list[Node], slots: int) -> None:
         self._sink.commit()
         clear(self._column)
-        self.form = self.flags = self.place = None
+        self.form = self.flags = self.place = self.room = None
         self.slots = []
         if not nodes:
             self._column.addWidget(note("Click something in the picture or the outliner to see what it is."))
@@ -84,6 +87,9 @@ class PropertiesPanel(Panel):
         infos = shared_infos(nodes)
         self.form = NodeForm(type(nodes[-1]), infos, self._sink)
         self._column.addWidget(self.form)
+        if len(nodes) == 1 and isinstance(nodes[0], Room):
+            self.room = RoomForm(self.context.editing)
+            self._column.addWidget(self.room)
         if not any(isinstance(node, Environment) for node in nodes):
             self._column.addWidget(heading("Place"))
             self.place = PlaceEditor(self.context)
@@ -98,14 +104,16 @@ class PropertiesPanel(Panel):
     def _materials(self, scene: Scene, nodes: list[Node], slots: int) -> QWidget:
         box = QWidget()
         layout = form_layout(box)
+        named = slots == len(SLOTS) and all(isinstance(node, Room) for node in nodes)
         for index in range(slots):
             combo = Combo()
             combo.setPlaceholderText(MIXED)
-            combo.setAccessibleName(f"Material {index + 1}")
+            slot = SLOTS[index] if named else f"Slot {index + 1}" if slots > 1 else "Material"
+            combo.setAccessibleName(f"Material {slot.lower()}" if slots > 1 else slot)
             for material in scene.materials.values():
                 combo.addItem(material.name, material.id)
             combo.activated.connect(lambda _, i=index: self._assign(i))
-            layout.addRow(form_label(f"Slot {index + 1}" if slots > 1 else "Material"), combo)
+            layout.addRow(form_label(slot), combo)
             self.slots.append(combo)
         meshes = [node for node in nodes if isinstance(node, MeshObject)]
         told = f"{sum(len(mesh.geometry.faces) for mesh in meshes):,} triangles"
@@ -123,6 +131,8 @@ class PropertiesPanel(Panel):
         self.flags.show_values(*shared_values(looked, _FLAGS))
         if self.place is not None:
             self.place.show_nodes(scene, self.nodes)
+        if self.room is not None and isinstance(nodes[-1], Room):
+            self.room.show_room(nodes[-1])
         meshes = [node for node in looked if isinstance(node, MeshObject)]
         for index, combo in enumerate(self.slots):
             there = {material for mesh in meshes for material in self._in_slot(mesh, index)}
