@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Callable
 
 import numpy as np
@@ -10,12 +9,12 @@ import numpy.typing as npt
 
 from studio_core.edits import Compound, Edit, SetFields
 from studio_core.rooms import new_room
-from studio_core.scene.bounds import scene_bounds
 from studio_core.scene.nodes import MeshObject, NodeId, Scene
 from studio_core.scene.room import Room
 from studio_core.scene.room_shape import Opening, RoomShape, outward
 from studio_core.scene.transform import Vec3
 from studio_core.session import View
+from studio_ui.canvas.projection import own_corners
 from studio_ui.context import Context
 
 LEAST = (5.0, 4.0)  # metres: width and depth
@@ -84,13 +83,15 @@ def room_around(scene: Scene, view: View) -> tuple[Edit, NodeId, tuple[NodeId, .
 
     Walls that stand between the eye and the inside are left out, so that one sees something.
     """
-    shown = [node for node in scene.of(MeshObject) if scene.shown(node.id) and not isinstance(node, Room)]
+    meshes = [node for node in scene.of(MeshObject) if len(node.geometry.positions)]
+    shown = [node for node in meshes if scene.shown(node.id) and not isinstance(node, Room)]
     floors = tuple(node.id for node in shown if _is_floor(scene, node))
     furniture = [node for node in shown if node.id not in floors]
     width, depth = LEAST
     centre: Vec3 = (0.0, 0.0, 0.0)
     if furniture:
-        low, high = scene_bounds(Scene().with_nodes(*_with_parents(scene, furniture)))
+        corners = np.concatenate([own_corners(scene, node.id) for node in furniture])
+        low, high = corners.min(axis=0), corners.max(axis=0)
         size = high - low
         if max(size[0], size[2]) <= MOST:
             width, depth = (max(a, _up(b + 2 * ROUND)) for a, b in zip(LEAST, size[[0, 2]], strict=True))
@@ -125,17 +126,10 @@ def _own(scene: Scene, node: NodeId, point: F64) -> F64:
     return made
 
 
-def _with_parents(scene: Scene, nodes: list[MeshObject]) -> list[MeshObject]:
-    """The nodes on their own, where they are in the world."""
-    return [dataclasses.replace(node, parent=None, transform=scene.world(node.id)) for node in nodes]
-
-
 def _is_floor(scene: Scene, node: MeshObject) -> bool:
     """Whether something is as flat and wide as a floor, and lies where a room's floor will be."""
-    if not len(node.geometry.positions):
-        return False
-    low, high = scene_bounds(Scene().with_nodes(*_with_parents(scene, [node])))
-    size = high - low
+    corners = own_corners(scene, node.id)
+    low, size = corners.min(axis=0), np.ptp(corners, axis=0)
     return bool(size[1] < _FLAT and min(size[0], size[2]) > _WIDE and abs(low[1]) < _FLAT)
 
 
