@@ -73,6 +73,7 @@ class Document:
         self._untold: deque[tuple[Scene, Scene]] = deque()
         self._telling = False
         self.changed: Signal[[Scene, Scene, Changes]] = Signal()
+        self.saved: Signal[[]] = Signal()
         self.saved_scene: Scene | None = self._scene
 
     @property
@@ -213,8 +214,9 @@ class Document:
         self._show(self.saved_scene)
 
     def mark_saved(self, scene: Scene) -> None:
-        """Remember what is in the file."""
+        """Remember what is in the file, and tell `saved()`."""
         self.saved_scene = scene
+        self.saved.emit()
 
     def _show(self, after: Scene) -> None:
         before, self._scene = self._scene, after

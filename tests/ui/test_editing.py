@@ -178,7 +178,7 @@ def test_the_history_goes_to_a_step(driver: Driver) -> None:
         driver.do(action)
     panel = driver.window.panels["history"]
     driver.until(lambda: panel.list.count() == 4)
-    panel._go(panel.list.item(1))
+    panel.list.setCurrentRow(1)
     assert driver.document.position == 1
     assert driver.document.scene.world("stool").translation == pytest.approx((1.05, 0, 0))
     assert panel.list.item(3).font().italic()

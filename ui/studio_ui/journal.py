@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 import traceback
-from collections import deque
+from collections import Counter, deque
 from dataclasses import dataclass
 from typing import Literal
 
@@ -31,11 +31,14 @@ class Journal:
         self.entries: deque[Entry] = deque(maxlen=limit)
         self.added: Signal[[Entry]] = Signal()
         self.cleared: Signal[[]] = Signal()
+        self.seen: Signal[[]] = Signal()
+        self._unseen: Counter[Level] = Counter()
 
     def write(self, text: str, level: Level = "note", detail: str = "") -> None:
         """Add a line."""
         entry = Entry(level, text, detail, time.time())
         self.entries.append(entry)
+        self._unseen[level] += 1
         self.added.emit(entry)
 
     def problem(self, doing: str, error: BaseException) -> str:
@@ -51,7 +54,18 @@ class Journal:
         self.write(text, "problem", "".join(traceback.format_exception(error)))
         return text
 
+    def unseen(self, level: Level) -> int:
+        """How many lines of a level nobody has looked at."""
+        return self._unseen[level]
+
+    def see(self) -> None:
+        """Somebody looks at the lines."""
+        if self._unseen.total():
+            self._unseen.clear()
+            self.seen.emit()
+
     def clear(self) -> None:
         """Forget all lines."""
         self.entries.clear()
         self.cleared.emit()
+        self.see()

@@ -62,6 +62,11 @@ class Layout:
         """None."""
         return {}
 
+    def show(self, name: str) -> None:
+        """Bring a panel to the front."""
+        self.docks[name].show()
+        self.docks[name].raise_()
+
     def restore(self) -> None:
         """As it was left; what is here now becomes what `reset` goes back to."""
         self._first = self._window.saveState(_VERSION)

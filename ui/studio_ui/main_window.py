@@ -15,6 +15,7 @@ from studio_ui.actions.action_set import ActionSet
 from studio_ui.appearance import Appearance
 from studio_ui.arranging import Arranging
 from studio_ui.ask import Ask
+from studio_ui.badge import Badge
 from studio_ui.cameras import Cameras
 from studio_ui.canvas.choice import CanvasChoice
 from studio_ui.canvas.switch_viewport import SwitchViewport
@@ -88,6 +89,8 @@ class MainWindow(QMainWindow):
         self.files = ProjectFiles(context, self.ask, settings, files_executor, thumbnails)
         self.saved = SavedLabel(self.files)
         self.status.addPermanentWidget(self.saved)
+        self.badge = Badge(context.journal, lambda: self.layout_.show("log"))
+        self.status.addPermanentWidget(self.badge)
         self.following = Following(self, context, viewport, self.status, self.files)
         features = self._features()
         load = self.transfer.load_environment
@@ -256,5 +259,6 @@ class MainWindow(QMainWindow):
         self.view_controls.close_panel()
         self.hints.close_panel()
         self.quality.close_panel()
+        self.badge.close_panel()
         for panel in self.panels.values():
             panel.close_panel()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any, TypeVar
@@ -14,6 +15,7 @@ from studio_core.signal import Signal
 from studio_ui.journal import Journal
 
 T = TypeVar("T")
+_KEPT = 12
 
 
 @dataclass
@@ -41,6 +43,7 @@ class Tasks:
         self, executor: Executor, post: Callable[[Callable[[], None]], None], journal: Journal
     ) -> None:
         self.running: list[Task] = []
+        self.finished: deque[Task] = deque(maxlen=_KEPT)  # the last of them; quiet ones are left out
         self.changed: Signal[[]] = Signal()
         self._executor, self._post, self._journal = executor, post, journal
 
@@ -101,6 +104,7 @@ class Tasks:
         task.state = "done" if error is None else "cancelled" if isinstance(error, Cancelled) else "failed"
         if task in self.running:
             self.running.remove(task)
+            self.finished.append(task)
         self.changed.emit()
         if error is None:
             done(result)

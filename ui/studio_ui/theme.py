@@ -90,6 +90,10 @@ QToolButton:hover { background: $raised; }
 QToolButton:focus { border-color: $accent; }
 QToolButton:pressed, QToolButton:checked { background: $accent; color: $on_accent; }
 QToolButton::menu-indicator { image: none; }
+QToolButton[role="filter"] { color: $dim; padding: 2px 5px; }
+QToolButton[role="filter"]:checked { background: $raised; color: $text; }
+QToolButton[role="problem"] { color: $problem; padding: 1px 6px; }
+QToolButton[role="warning"] { color: $warning; padding: 1px 6px; }
 QToolButton[role="small"] { padding: 1px; }
 QToolButton[role="fold"]:checked { background: transparent; color: $text; }
 QDockWidget { color: $dim; font-weight: 600; }

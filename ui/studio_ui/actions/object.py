@@ -50,7 +50,7 @@ ITEMS: tuple[Item, ...] = (
     ActionSpec("object.photograph", "Stand in the photograph", "Object", "",
                "A floor for shadows on the photographed room, whose picture is seen on the ground"),
     ActionSpec("object.drop", "Drop", "Object", "End", "Down onto what lies below it, or the floor",
-               icon="drop", bar=True, enabled="movable"),
+               icon="drop", bar=True, enabled="movable", canvas=True),
     _align("left", "Left sides"),
     _align("centre", "Middles, left to right"),
     _align("right", "Right sides"),

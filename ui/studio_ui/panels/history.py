@@ -1,18 +1,22 @@
-"""History: every step by name; a click goes there."""
+"""History: every step by name; a click, or an arrow key, goes there."""
 
 from __future__ import annotations
 
-from PySide6.QtCore import QSignalBlocker, QTimer
-from PySide6.QtGui import QColor
+from PySide6.QtCore import QSignalBlocker, QSize, Qt, QTimer
+from PySide6.QtGui import QColor, QIcon, QPixmap
 from PySide6.QtWidgets import QListWidget, QListWidgetItem
 
 from studio_ui.context import Context
-from studio_ui.panels.panel import Panel
+from studio_ui.icons import icon
+from studio_ui.panels.panel import Panel, note
 from studio_ui.theme import Theme
+
+_FIRST = {"Open": "As it was opened", "New": "Empty project"}
+_ICON = QSize(13, 13)
 
 
 class HistoryPanel(Panel):
-    """The document's steps, those undone dimmed."""
+    """The document's steps: those undone dimmed, the one that is in the file marked."""
 
     id = "history"
     title = "History"
@@ -20,9 +24,15 @@ class HistoryPanel(Panel):
     def __init__(self, context: Context) -> None:
         super().__init__(context)
         self.list = QListWidget()
+        self.list.setAccessibleName("Steps")
         self.list.setUniformItemSizes(True)
-        self.list.itemClicked.connect(self._go)
-        self.column.addWidget(self.list)
+        self.list.setIconSize(_ICON)
+        self.list.setTextElideMode(Qt.TextElideMode.ElideMiddle)
+        self.list.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        self.list.currentRowChanged.connect(self._go)
+        self.told = note("")
+        self.column.addWidget(self.list, 1)
+        self.column.addWidget(self.told)
         self._shown: list[str] = []
         self._soon = QTimer(self)
         self._soon.setSingleShot(True)
@@ -30,6 +40,7 @@ class HistoryPanel(Panel):
         editing = context.editing
         self.subscriptions.add(
             context.document.changed.connect(lambda *_: None if editing.busy else self._soon.start(0)),
+            context.document.saved.connect(lambda: self._soon.start(0)),
             editing.settled.connect(lambda: self._soon.start(0)),
         )
         self.refresh()
@@ -42,28 +53,46 @@ class HistoryPanel(Panel):
     def refresh(self) -> None:
         """Show what the document remembers."""
         document = self.context.document
-        labels = [step.label for step in document.history]
+        at, steps = document.position, document.history
+        labels = [step.label for step in steps]
+        labels[0] = _FIRST.get(labels[0], labels[0])
+        saved = icon("save", self.theme.dim, selected=self.theme.on_accent)
+        blank = QPixmap(_ICON)
+        blank.fill(Qt.GlobalColor.transparent)
+        empty = QIcon(blank)
         with QSignalBlocker(self.list):
             same = len(_common(self._shown, labels))
             while self.list.count() > same:
                 self.list.takeItem(self.list.count() - 1)
             for label in labels[same:]:
                 self.list.addItem(QListWidgetItem(label))
-            for index in range(self.list.count()):
-                gone = index > document.position
-                colour = QColor(self.theme.dim if gone else self.theme.text)
+            for index, step in enumerate(steps):
                 item = self.list.item(index)
-                item.setForeground(colour)
+                gone, in_file = index > at, step.scene is document.saved_scene
+                item.setForeground(QColor(self.theme.dim if gone else self.theme.text))
                 font = item.font()
                 font.setItalic(gone)
                 item.setFont(font)
-            self.list.setCurrentRow(document.position)
-            self.list.scrollToItem(self.list.item(document.position))
+                item.setIcon(saved if in_file else empty)
+                told = "Undone: click to have it again" if gone else "Click to go back to this"
+                told = "What is shown" if index == at else told
+                item.setToolTip(f"{labels[index]}\n{told}{' (saved in the file)' * in_file}")
+            self.list.setCurrentRow(at)
+            self.list.scrollToItem(self.list.item(at))
         self._shown = labels
+        self.told.setText(_told(at, len(steps)))
 
-    def _go(self, item: QListWidgetItem) -> None:
-        self.context.editing.go_to(self.list.row(item))
-        self.refresh()
+    def _go(self, row: int) -> None:
+        if row >= 0 and row != self.context.document.position:
+            self.context.editing.go_to(row)
+            self.refresh()
+
+
+def _told(at: int, count: int) -> str:
+    undone = count - 1 - at
+    if count == 1:
+        return "Nothing was changed yet."
+    return f"{at} step{'s' * (at != 1)} done" + (f", {undone} undone" if undone else "")
 
 
 def _common(a: list[str], b: list[str]) -> list[str]:
