@@ -86,7 +86,7 @@ def test_damaged_keys_are_left_out(kept: Settings) -> None:
     assert {name: shortcuts.of(name) for name in DEFAULTS} == DEFAULTS
 
 
-@pytest.mark.parametrize("keys", ["Esc", "Tab", "F6", "Space", "Nonsense+Q"])
+@pytest.mark.parametrize("keys", ["Esc", "Tab", "Return", "Space", "Nonsense+Q"])
 def test_some_keys_are_refused(keys: str, kept: Settings) -> None:
     shortcuts = Shortcuts(kept, DEFAULTS)
     with pytest.raises(ValueError, match=r".+"):
@@ -144,8 +144,8 @@ def test_a_key_is_recorded_or_asked_about(kept: Settings, qtbot: QtBot) -> None:
     assert shortcuts.of("file.save") == ""
     page.reset_all.click()
     assert shortcuts.of("file.save") == "Ctrl+S"
-    page.edit.setKeySequence(QKeySequence("F6"))
-    assert "F6" in page.told.text()
+    page.edit.setKeySequence(QKeySequence("Tab"))
+    assert "Tab" in page.told.text()
     assert shortcuts.of("file.save") == "Ctrl+S"
     page.close_panel()
 

@@ -158,9 +158,11 @@ class PluginsDialog(QDialog):
         self.setWindowTitle("Plugins")
         self.resize(640, 440)
         self.tree = QTreeWidget()
+        self.tree.setAccessibleName("Plugins")
         self.tree.setHeaderLabels(["Plugin", "Provides"])
         self.tree.setRootIsDecorated(False)
         self.detail = QPlainTextEdit()
+        self.detail.setAccessibleName("What failed")
         self.detail.setReadOnly(True)
         for plugin in host.plugins:
             kinds = [f"{kind}: {', '.join(names)}" for kind, names in plugin.provides.items()]
@@ -194,6 +196,7 @@ class KeysDialog(QDialog):
         self.setWindowTitle("Keys and mouse")
         self.resize(520, 560)
         tree = QTreeWidget()
+        tree.setAccessibleName("Keys and mouse")
         tree.setHeaderLabels(["What", "How"])
         tree.setRootIsDecorated(False)
         for what, how in keys:

@@ -41,6 +41,7 @@ class HintBar(QFrame):
         self._close = QToolButton()
         self._close.setAutoRaise(True)
         self._close.setToolTip("Close the hints")
+        self._close.setAccessibleName("Close the hints")
         self._close.clicked.connect(self.dismiss)
         layout.addWidget(self._close)
         self._subscriptions = Subscriptions()

@@ -46,6 +46,7 @@ class Layout:
         for tabs in window.findChildren(QTabBar):
             tabs.setElideMode(Qt.TextElideMode.ElideNone)
             tabs.setUsesScrollButtons(False)
+            tabs.setAccessibleName("Panels")
         window.resizeDocks([docks["outliner"], docks["history"]], [560, 260], Qt.Orientation.Vertical)
         sides = [docks["outliner"], docks["properties"]]
         window.resizeDocks(sides, [PANEL_WIDTH - 40, PANEL_WIDTH + 20], Qt.Orientation.Horizontal)

@@ -35,6 +35,7 @@ from studio_ui.files.versions import Versions
 from studio_ui.following import Following
 from studio_ui.help import Help
 from studio_ui.hint_bar import HintBar
+from studio_ui.keyboard import Keyboard
 from studio_ui.layout import Layout
 from studio_ui.magnet import Magnet
 from studio_ui.menus import Menus
@@ -141,6 +142,7 @@ class MainWindow(QMainWindow):
         self.appearance = Appearance(self.preferences, viewport, self.canvas)
         self.layout_ = Layout(self, settings, self._panels())
         self.panels, self.docks = self.layout_.panels, self.layout_.docks
+        self.keyboard = Keyboard(self, lambda: viewport.inner.widget, self.docks)
         chosen = PreferencesFeature(
             self, self.preferences, self.shortcuts, context.tasks, user_cache() / "computed"
         )
@@ -166,6 +168,7 @@ class MainWindow(QMainWindow):
             self.layout_,
             self.palette_,
             chosen,
+            self.keyboard,
             Choosing(context),
             ConsoleDoor(self.panels["console"], self.docks["console"]),
             Help(self, context.host, self.shortcuts, self.viewing.mouse),
@@ -197,6 +200,7 @@ class MainWindow(QMainWindow):
         self.view_controls = ViewControls(self.context, self.cameras)
         bar.addWidget(self.view_controls)
         self.addToolBar(bar)
+        self.keyboard.start([bar, self.statusBar()], self.actions_.menus["Object"])
 
     def _follow(self) -> None:
         self._autosave = QTimer(self)

@@ -20,8 +20,6 @@ _TAKEN = {
     "Return": "Enter takes what was typed",
     "Enter": "Enter takes what was typed",
     "Space": "Space presses buttons",
-    "F6": "F6 goes from panel to panel",
-    "Shift+F6": "Shift+F6 goes from panel to panel",
     "Shift+F10": "Shift+F10 opens the context menu",
     "Menu": "This key opens the context menu",
 }

@@ -46,6 +46,8 @@ class ViewControls(QWidget):
         super().__init__()
         self._context, self._seen = context, cameras
         self.camera, self.transform = Combo(), Combo()
+        self.camera.setAccessibleName("Camera")
+        self.transform.setAccessibleName("View transform")
         self.camera.setToolTip("Look through a camera of the scene")
         self.camera.setMinimumWidth(120)
         self.exposure = NumberField("exposure", _EXPOSURE, _Exposure(context))

@@ -105,7 +105,8 @@ class ActionSet:
         if path not in self.menus:
             above, _, name = path.rpartition("/")
             parent = self.menu(bar, above) if above else bar
-            self.menus[path] = parent.addMenu(name)
+            # top menus open by Alt and their first letter
+            self.menus[path] = parent.addMenu(name if above else f"&{name}")
         return self.menus[path]
 
     def fill_bar(self, bar: QToolBar) -> None:

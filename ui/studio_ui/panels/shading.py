@@ -47,6 +47,7 @@ class ShadingPanel(Panel):
         for name in names:
             backend = self._backend(name)
             self.combo.addItem(backend.label if backend is not None else name, name)
+        self.combo.setAccessibleName("Method")
         self.combo.setCurrentIndex(self.combo.findData(session.backend))
         self.combo.setEnabled(self.context.warm)
         self.combo.activated.connect(lambda i: session.shade_with(names[i]))

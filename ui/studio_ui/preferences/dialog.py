@@ -99,6 +99,7 @@ class PreferencesDialog(QDialog):
             area = QScrollArea()
             area.setWidgetResizable(True)
             area.setFrameShape(QFrame.Shape.NoFrame)
+            area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
             area.setWidget(content)
             column.addWidget(area, 1)
         else:

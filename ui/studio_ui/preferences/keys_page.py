@@ -47,7 +47,8 @@ class KeysPage(QWidget):
         self.tree.currentItemChanged.connect(lambda *_: self._show())
         self.edit = QKeySequenceEdit()
         self.edit.setMaximumSequenceLength(1)
-        self.edit.setAccessibleName("Press the new key")
+        for recorder in (self.edit, *self.edit.findChildren(QLineEdit)):
+            recorder.setAccessibleName("Press the new key")
         self.edit.setToolTip("Click here, then press the key, with Ctrl, Shift or Alt if you like")
         self.edit.keySequenceChanged.connect(self._recorded)
         self.clear = _button("No key", "The command keeps its place in the menus")
