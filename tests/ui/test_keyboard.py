@@ -12,9 +12,12 @@ from PySide6.QtWidgets import QAbstractButton, QApplication, QLabel, QLineEdit, 
 from pytestqt.qtbot import QtBot
 from ui_support import Driver
 
+from studio_core.params import ParamInfo
 from studio_core.registry import PluginHost
 from studio_ui.dialogs import KeysDialog, PluginsDialog
+from studio_ui.fields import TextField
 from studio_ui.keyboard import in_order
+from studio_ui.sinks import PlainSink
 
 INNER = ("qt_spinbox_lineedit", "qt_scrollarea_hcontainer", "qt_scrollarea_vcontainer")
 
@@ -130,6 +133,19 @@ def test_esc_goes_back_to_the_picture(panel: str, chosen: Driver) -> None:
         if QApplication.focusWidget() is not chosen.viewport:
             QTest.keyClick(QApplication.focusWidget(), Qt.Key.Key_Escape)
     assert QApplication.focusWidget() is chosen.viewport
+
+
+def test_esc_takes_back_what_was_typed(qtbot: QtBot) -> None:
+    told: list[object] = []
+    field = TextField("name", ParamInfo("text", "Name"), PlainSink(lambda name, value: told.append(value)))
+    qtbot.addWidget(field)
+    field.show_value("Chair")
+    QTest.keyClicks(field.edit, "x")
+    QTest.keyClick(field.edit, Qt.Key.Key_Escape)
+    assert field.edit.text() == "Chair"
+    QTest.keyClicks(field.edit, "Stool")
+    QTest.keyClick(field.edit, Qt.Key.Key_Return)
+    assert told == ["Stool"], "what is selected is typed over"
 
 
 def test_the_context_menu_s_key_opens_the_object_menu(chosen: Driver) -> None:

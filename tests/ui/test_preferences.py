@@ -116,7 +116,7 @@ def test_what_is_changed_in_the_dialog_counts_at_once(driver: Driver) -> None:
     window.preferences.set("autosave", 30.0)
     assert window.files.keeper.autosaver.interval == 30.0
     window.preferences.set("navigation", "blender")
-    assert window.actions_["view.navigation_blender"].isChecked() or window.following.pending
+    driver.until(lambda: window.actions_["view.navigation_blender"].isChecked())
     dialog.close()
 
 

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any
 
 from PySide6.QtCore import QSignalBlocker, Qt
-from PySide6.QtGui import QWheelEvent
+from PySide6.QtGui import QKeyEvent, QWheelEvent
 from PySide6.QtWidgets import (
     QCheckBox,
     QComboBox,
@@ -217,12 +218,29 @@ class ChoiceField(Field):
             self.combo.setCurrentIndex(-1)
 
 
+class Line(QLineEdit):
+    """A line of text; Esc puts back `before()`."""
+
+    def __init__(self, before: Callable[[], str]) -> None:
+        super().__init__()
+        self._before = before
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        """Esc takes back what was typed, then it is the window's."""
+        if event.key() == Qt.Key.Key_Escape and self.text() != self._before():
+            self.setText(self._before())
+            self.selectAll()
+            event.accept()
+        else:
+            super().keyPressEvent(event)
+
+
 class TextField(Field):
     """A line of text."""
 
     def __init__(self, name: str, info: ParamInfo, sink: Sink) -> None:
         super().__init__(name, info, sink)
-        self.edit = QLineEdit()
+        self.edit = Line(lambda: self._value)
         self.edit.setAccessibleName(info.label)
         self.row.addWidget(self.edit, 1)
         self._value = ""

@@ -212,7 +212,9 @@ class MainWindow(QMainWindow):
         self.cameras.changed.connect(self.following.soon)
         self.following.start(self.actions_)
         self.aids.start()
-        self.effects = Effects(self.preferences, self.context, self.files, self.quality, self.viewing)
+        self.effects = Effects(
+            self.preferences, self.context, self.files, self.quality, self.viewing, self.following.soon
+        )
         self.preferences_.dress_numbers()
 
     def _opened(self) -> None:

@@ -13,6 +13,7 @@ from studio_core.shading.artifacts import MeasuredError
 from studio_ui.canvas.viewport import Probe
 from studio_ui.feed import Freshness, Shown
 from studio_ui.journal import Entry
+from studio_ui.number_style import number_style
 
 _SHOWN_MS = 9000
 _ERROR = "Relative error of the picture against brute force, measured at random places while nothing moves"
@@ -115,7 +116,8 @@ class StatusBar(QStatusBar):
         red, green, blue = probe.radiance
         node = scene.nodes.get(probe.node) if probe.node is not None else None
         name = node.name if node is not None else "background"
-        place = f", {probe.distance:.2f} m" if math.isfinite(probe.distance) else ""
+        far = math.isfinite(probe.distance)
+        place = f", {number_style(self).text(probe.distance, 'm', 2)}" if far else ""
         self.pixel.setText(f"{name}{place}: {red:.3g} {green:.3g} {blue:.3g}")
 
 

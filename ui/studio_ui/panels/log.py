@@ -61,7 +61,6 @@ class LogPanel(Panel):
         self.fold.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextBesideIcon)
         self.fold.toggled.connect(lambda _: self._show())
         self.detail = QPlainTextEdit()
-        self.detail.setAccessibleName("Details of the message")
         self.detail.setReadOnly(True)
         self.detail.setAccessibleName("Technical detail")
         self.detail.setFont(QFontDatabase.systemFont(QFontDatabase.SystemFont.FixedFont))

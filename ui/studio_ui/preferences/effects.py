@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 from studio_ui.context import Context
+from studio_ui.preferences.catalogue import ALL
 from studio_ui.preferences.store import Preferences
 from studio_ui.project_files import ProjectFiles
 from studio_ui.quality import QualityControl
@@ -22,7 +23,9 @@ class Effects:
         files: ProjectFiles,
         quality: QualityControl,
         viewing: Viewing,
+        soon: Callable[[], object],
     ) -> None:
+        """`soon` asks the actions again which of them are on."""
         self._preferences, self._quality = preferences, quality
         self._off: list[Callable[[], None]] = []
         autosaver = files.keeper.autosaver
@@ -31,6 +34,8 @@ class Effects:
         self._later("navigation", viewing.navigate_like)
         self._later("invert_wheel", viewing.invert_wheel)
         self._later("animate_view", viewing.animate)
+        for preference in ALL:
+            self._later(preference.name, lambda _: soon())
         self._off += [
             files.opened.connect(self._start_quality),
             context.warmed.connect(self._start_quality),
