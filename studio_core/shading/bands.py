@@ -18,17 +18,28 @@ import numpy.typing as npt
 
 from studio_core.arrays import frozen_map
 from studio_core.contract import Services, ShadingBackend
+from studio_core.kernels.compose import RECORD
 from studio_core.raster import CoefficientTable, Compositor
 from studio_core.scene.diff import Aspect, Changes, diff, everything, view_changed
 from studio_core.scene.geometry import Image
-from studio_core.scene.nodes import WHITE, Environment, Light, NodeId, Scene, new_id
+from studio_core.scene.nodes import WHITE, Environment, Light, Node, NodeId, Scene, new_id
 from studio_core.session import View
-from studio_core.shading.artifacts import Casters, Hits, MeasuredError, Radiance, Surfaces
+from studio_core.shading.artifacts import (
+    TERMS,
+    Casters,
+    Hits,
+    LayerRadiance,
+    MeasuredError,
+    Radiance,
+    Surfaces,
+)
+from studio_core.shading.backdrop import BackdropPainter
 from studio_core.shading.error_meter import ErrorMeter
 from studio_core.shading.frame import Frame
 from studio_core.shading.job import Job
 from studio_core.shading.job_parts import JobPart
 from studio_core.shading.lamps import shown_environment
+from studio_core.shading.open_light import OpenLight
 from studio_core.shading.pipeline import Inputs, Pipeline
 from studio_core.shading.refinement import LocatedPrimaryStage
 
@@ -45,7 +56,8 @@ WHITE_SKY = Image(np.ones((1, 2, 3), np.float32))
 class Parts:
     """What of a picture is asked for besides its colours.
 
-    transparent: nothing behind the objects, and `alpha`; lights: a picture for every light, which add up.
+    transparent: nothing behind the objects, and `alpha`, which is also where shadows are caught; lights: a
+    picture for every light, which add up.
     """
 
     transparent: bool = False
@@ -80,6 +92,7 @@ class PictureMaker:
         self._pipeline = Pipeline(backend.stages(services))
         self._coefficients = CoefficientTable(services.registry)
         self._compositor = Compositor(services.workers)
+        self._backdrop = BackdropPainter(services.workers)
         self._frame: Frame | None = None
         self._view = View()
 
@@ -143,19 +156,35 @@ class PictureMaker:
             picture = self._compositor.picture(of, light, hits, table, job)
             return np.ascontiguousarray(picture.linear[skip : skip + height])
 
-        sky = shown_environment(scene)
-        bare = scene if sky is None else scene.with_nodes(dataclasses.replace(sky, background=False))
-        alpha, lights = None, {}
-        linear = made(bare if parts.transparent else scene, radiance)
+        sky, alpha, lights = shown_environment(scene), None, {}
         if parts.transparent:
-            dark = dataclasses.replace(radiance, layers={})
-            alpha = np.float32(1) - made(_white(scene, sky), dark)[:, :, 0]
+            white, passed = self._white(scene, radiance, sky)
+            alpha = np.clip(np.float32(1) - made(white, passed)[:, :, 1], 0, 1)
+            if sky is not None:
+                scene = scene.with_nodes(dataclasses.replace(sky, background=False))
+        linear = made(scene, radiance)
         if parts.lights:
+            # surfaces that catch shadows need the picture that they stand in, which counts once
+            unlit = scene if sky is None else scene.with_nodes(_darkened(scene[sky.id]))
             for node in layers_of(scene, radiance):
-                behind = scene if sky is not None and node == sky.id and not parts.transparent else bare
-                layer = {node: radiance.layers[node]}
-                lights[node] = made(behind, dataclasses.replace(radiance, layers=layer))
+                own = scene if sky is not None and node == sky.id else unlit
+                lights[node] = made(own, dataclasses.replace(radiance, layers={node: radiance.layers[node]}))
         return Band(hits.view.top + skip, linear, alpha, frozen_map(lights))
+
+    def _white(self, scene: Scene, radiance: Radiance, sky: Environment | None) -> tuple[Scene, Radiance]:
+        """White behind dark objects: what is seen of it is not covered. Caught shadows stay as they are."""
+        plain = {"image": WHITE_SKY, "intensity": 1.0, "tint": WHITE, "temperature": 0.0, "background": True}
+        white = dataclasses.replace(sky or Environment(id=new_id("white"), image=WHITE_SKY), **plain)  # type: ignore[arg-type]
+        mesh, layers = radiance.surfaces.mesh, {}
+        if sky is not None and radiance.surfaces.catches.any():
+            record = np.zeros((len(radiance.valid), RECORD), np.float32)
+            seen = scene.with_nodes(dataclasses.replace(sky, background=True))
+            self._backdrop.light(seen, radiance, record)
+            turn = sky.rotation().matrix()[:3, :3]
+            even = OpenLight(np.ones((96, 192, 3), np.float32)).irradiance(mesh.normals @ turn)
+            arrives = (record[:, 3:6] * even).astype(np.float32)
+            layers[white.id] = LayerRadiance(np.zeros((len(arrives), TERMS, 3), np.float32), arrives)
+        return scene.with_nodes(white), dataclasses.replace(radiance, layers=layers)
 
 
 class _Rounds(JobPart):
@@ -189,8 +218,6 @@ def _samples(view: View) -> int:
     return view.width * view.height * view.antialias**2
 
 
-def _white(scene: Scene, sky: Environment | None) -> Scene:
-    """A scene in which nothing but white is behind the objects."""
-    plain = {"image": WHITE_SKY, "intensity": 1.0, "tint": WHITE, "temperature": 0.0, "background": True}
-    made = Environment(id=new_id("white"), image=WHITE_SKY) if sky is None else sky
-    return scene.with_nodes(dataclasses.replace(made, **plain))  # type: ignore[arg-type]
+def _darkened(sky: Node) -> Node:
+    assert isinstance(sky, Environment)
+    return dataclasses.replace(sky, intensity=0.0)

@@ -133,6 +133,35 @@ def test_over_its_background_a_transparent_picture_is_the_opaque_one(make):
     assert opaque.alpha is None
 
 
+def photographed(scene, level=0.7):
+    """The scene with a floor that catches shadows, under a constant sky."""
+    sky = scene["sky"]
+    grey = dataclasses.replace(sky.image, pixels=np.full((4, 8, 3), level, np.float32))
+    floor = dataclasses.replace(scene.material("matt"), catches=True)
+    return scene.with_materials(floor).with_nodes(dataclasses.replace(sky, image=grey))
+
+
+def test_caught_shadows_are_alpha(make):
+    scene = photographed(make_little_scene())
+    maker = make()
+    maker.shade(scene, view_of(scene), Job("Shading"))
+    (opaque,) = maker.bands(Job("Rendering"))
+    (band,) = maker.bands(Job("Rendering"), Parts(transparent=True))
+    behind = (1 - band.alpha[:, :, None]) * np.float32(0.7)
+    np.testing.assert_allclose(band.linear + behind, opaque.linear, rtol=2e-3, atol=2e-3)
+    shaded = (band.linear == 0).all(axis=2) & (band.alpha > 0.05)
+    assert shaded.mean() > 0.02  # black with some alpha: the shadow of the cube
+
+
+def test_lights_add_up_where_shadows_are_caught(make):
+    scene = photographed(scene_with_glass())
+    maker = make()
+    maker.shade(scene, view_of(scene), Job("Shading"))
+    for transparent in (False, True):
+        (band,) = maker.bands(Job("Rendering"), Parts(transparent=transparent, lights=True))
+        np.testing.assert_allclose(sum(band.lights.values()), band.linear, rtol=1e-4, atol=1e-5)
+
+
 def test_without_an_environment_alpha_is_what_objects_cover(make):
     scene = scene_with_glass()
     nodes = {name: node for name, node in scene.nodes.items() if name != "sky"}
