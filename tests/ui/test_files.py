@@ -207,21 +207,3 @@ def test_a_picture_of_light_lights_the_scene(make: Make, tmp_path: Path) -> None
     driver.window.take_files([again])
     driver.until(lambda: driver.document.scene[sky.id].name == "dawn")
     assert driver.document.scene[sky.id].image.pixels[0, 0, 0] == np.float32(0.7)
-
-
-@pytest.mark.parametrize("suffix", [".png", ".exr"])
-def test_the_picture_is_exported_as_it_is_shown(driver: Driver, tmp_path: Path, suffix: str) -> None:
-    from studio_core.imaging.io import read_image
-
-    path = tmp_path / f"out{suffix}"
-    driver.answers.target = path
-    driver.do("file.export_picture")
-    driver.until(path.exists)
-    driver.idle()
-    made = read_image(path).pixels
-    shown = driver.feed.last.picture.linear
-    assert made.shape[:2] == shown.shape[:2]
-    if suffix == ".exr":
-        assert np.array_equal(made[..., :3], shown)
-    else:
-        assert made[0, 0, 0] == pytest.approx(63, abs=1)  # 0.05 linear

@@ -43,6 +43,7 @@ from studio_ui.palette import Palette, menu_entries
 from studio_ui.panels.all import all_panels
 from studio_ui.panels.console import ConsoleDoor
 from studio_ui.panels.panel import Panel, stacked
+from studio_ui.pictures.feature import PictureOut
 from studio_ui.preferences.effects import Effects
 from studio_ui.preferences.feature import PreferencesFeature
 from studio_ui.preferences.store import Preferences
@@ -138,6 +139,9 @@ class MainWindow(QMainWindow):
         self.aids = ViewAids(context, viewport, self.tools.looking, self.viewing, self.cameras, settings)
         self.transfer = Transfer(context, self.ask, self.files.beside)
         self.importing = Importing(context, self.ask, settings, self.viewing.frame_all)
+        self.pictures = PictureOut(
+            self, context, self.ask, settings, lambda: self.files.name, self.files.beside
+        )
         self.canvas = CanvasChoice(viewport, settings, context.journal.write)
         self.appearance = Appearance(self.preferences, viewport, self.canvas)
         self.layout_ = Layout(self, settings, self._panels())
@@ -158,6 +162,7 @@ class MainWindow(QMainWindow):
             Versions(context, self.ask, self.files),
             self.transfer,
             self.importing,
+            self.pictures,
             self.commands,
             self.viewing,
             self.arranging,
@@ -255,6 +260,7 @@ class MainWindow(QMainWindow):
         self.tools.close()
         self.context.feed.close()
         self.context.tasks.cancel()
+        self.pictures.close()
         self.files.close()
         self.following.close()
         self.effects.close()

@@ -55,17 +55,18 @@ class Tasks:
         failed: Callable[[Exception], object] | None = None,
         *,
         quiet: bool = False,
+        executor: Executor | None = None,
     ) -> Task:
         """Do `work(job)`; then `done(result)` here. Errors go to the journal, and to `failed`.
 
-        `quiet` keeps it out of the jobs panel (autosave).
+        `quiet` keeps it out of the jobs panel (autosave). What takes minutes brings its own `executor`.
         """
         job = Job(label, on_progress=lambda _: self._post(self.changed.emit))
         task = Task(job)
         if not quiet:
             self.running.append(task)
             self.changed.emit()
-        self._executor.submit(lambda: self._work(task, work, done, failed))
+        (executor or self._executor).submit(lambda: self._work(task, work, done, failed))
         return task
 
     def cancel(self) -> None:

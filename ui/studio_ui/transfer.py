@@ -8,7 +8,6 @@ from typing import Any
 
 from studio_core.contract import Exporter
 from studio_core.errors import PluginError
-from studio_core.kernels.tonemap import tonemap
 from studio_core.scene.geometry import Image
 from studio_core.shading.job import Job
 from studio_core.signal import Signal
@@ -17,7 +16,6 @@ from studio_ui.context import Context
 from studio_ui.environment_shelf import set_environment
 
 ENVIRONMENTS = Filter("Pictures of light", (".exr", ".hdr", ".tif", ".tiff", ".png", ".jpg", ".jpeg"))
-PNG, EXR = Filter("PNG picture, as shown", (".png",)), Filter("OpenEXR, scene-linear", (".exr",))
 
 
 class Transfer:
@@ -37,14 +35,13 @@ class Transfer:
         """By action id."""
         return {
             "file.environment": self.load_environment,
-            "file.export_picture": lambda: self.export_picture(self._beside(".png")),
             "file.export_glb": lambda: self.export_scene("glb", self._beside(".glb")),
             "file.export_mitsuba": lambda: self.export_scene("mitsuba", self._beside("")),
         }
 
     def conditions(self) -> dict[str, Callable[[], bool]]:
-        """By name."""
-        return {"picture": lambda: self._context.feed.last is not None}
+        """None."""
+        return {}
 
     # in
 
@@ -75,34 +72,6 @@ class Transfer:
             self._context.journal.write(f"{path.name}: {note}", "warning")
 
     # out
-
-    def export_picture(self, suggested: Path) -> None:
-        """The picture as it is on the screen (PNG), or scene-linear (EXR)."""
-        shown, session = self._context.feed.last, self._context.session
-        if shown is None:
-            self._context.journal.write("There is no picture to export yet.", "warning")
-            return
-        path = self._ask.save_file("Export picture", suggested.with_suffix(".png"), [PNG, EXR])
-        if path is None:
-            return
-        if path.suffix.lower() not in (".png", ".exr"):
-            path = path.with_name(path.name + ".png")
-        exposure, kind, linear = session.exposure, session.tonemap, shown.picture.linear
-
-        def write(job: Job) -> None:
-            from studio_core.imaging.encode import write_exr, write_png
-
-            if path.suffix.lower() == ".exr":
-                write_exr(path, linear)
-            else:
-                write_png(path, tonemap(linear, exposure, kind))
-
-        def done(_: None) -> None:
-            unfinished = "" if shown.final else " It was still being refined."
-            size = f"{linear.shape[1]} × {linear.shape[0]}"
-            self._context.journal.write(f"Exported {path.name}, {size} pixels.{unfinished}")
-
-        self._context.tasks.run(f"Exporting {path.name}", write, done)
 
     def export_scene(self, name: str, suggested: Path) -> None:
         """The scene through an exporter plugin; what it could not express goes to the journal."""

@@ -1,0 +1,1 @@
+"""Pictures out of the window: one, many, or onto the clipboard."""
