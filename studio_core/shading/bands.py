@@ -48,7 +48,7 @@ F32 = npt.NDArray[np.float32]
 GUIDE_SAMPLES = 1 << 23  # 1920 × 1080 with 2 × 2 samples
 BAND_SAMPLES = 1 << 22
 MARGIN = 2  # rows: whether something ends in a pixel is seen beside it; even, so that packets stay the same
-SHADING = 0.6  # of a picture's time, about
+COMPOSING = 0.05  # of the time that shading takes, for as many samples as a guide has
 WHITE_SKY = Image(np.ones((1, 2, 3), np.float32))
 
 
@@ -81,6 +81,11 @@ def guide(view: View, most: int) -> View:
     """The view itself, or in fewer pixels where it has more samples than `most`."""
     shrink = (most / (view.width * view.height * view.antialias**2)) ** 0.5
     return view if shrink >= 1 else view.sized(int(view.width * shrink), int(view.height * shrink))
+
+
+def shading_share(view: View) -> float:
+    """Which part of a picture's time is over when it is shaded, about."""
+    return 1 / (1 + COMPOSING * max(1.0, _samples(view) / GUIDE_SAMPLES))
 
 
 class PictureMaker:

@@ -15,7 +15,7 @@ from studio_core.imaging.rows import Facts
 from studio_core.scene.nodes import Scene
 from studio_core.session import View
 from studio_core.shading.artifacts import MeasuredError, Radiance
-from studio_core.shading.bands import SHADING, Band, Parts, PictureMaker, layers_of
+from studio_core.shading.bands import Band, Parts, PictureMaker, layers_of, shading_share
 from studio_core.shading.job import Job
 from studio_core.shading.job_parts import JobPart
 
@@ -54,15 +54,15 @@ def write_view(
     `places`: of so many random places the error is measured and told in the file (0: none). `watch` gets
     every band. Cancelled, or when the disk refuses (InputError), nothing is left.
     """
-    parts, started = parts or Parts(), time.perf_counter()
-    radiance = maker.shade(scene, view, JobPart(job, 0.0, SHADING, job.label))
+    parts, started, share = parts or Parts(), time.perf_counter(), shading_share(view)
+    radiance = maker.shade(scene, view, JobPart(job, 0.0, share, job.label))
     told = {
         "lucarne:exposure": finish.exposure,
         "lucarne:tonemap": finish.tonemap,
         "lucarne:samples": view.antialias**2,
         **(facts or {}),
     }
-    error = maker.measure(places, JobPart(job, SHADING, SHADING)) if places else None
+    error = maker.measure(places, JobPart(job, share, share)) if places else None
     if error is not None:
         told["lucarne:error"] = str(error.picture)
     shaded = time.perf_counter()
@@ -71,12 +71,12 @@ def write_view(
     total, count = 0.0, view.width * view.height * 3
     size = (view.width, view.height)
     with PictureFile(path, size, finish, alpha=parts.transparent, lights=names, facts=told) as file:
-        for band in maker.bands(JobPart(job, SHADING, 1.0), parts):
+        for band in maker.bands(JobPart(job, share, 1.0), parts):
             lights = {name: band.lights[node] for name, node in zip(names, nodes, strict=True)}
             file.write(band.linear, band.alpha, lights)
             total += float(band.linear.sum(dtype=np.float64))
             if watch is not None:
                 watch(band)
-    JobPart(job, SHADING, 1.0).at(1.0)
+    JobPart(job, share, 1.0).at(1.0)
     done = time.perf_counter()
     return Outcome(radiance, total / count, error, shaded - started, done - shaded)

@@ -30,7 +30,7 @@ from studio_core.shading.job import Job
 from studio_core.shading.scheduler import InlineExecutor
 from studio_ui.pictures.child import run_program
 from studio_ui.pictures.dialog import PictureDialog
-from studio_ui.pictures.export_dialog import ExportDialog
+from studio_ui.pictures.export_dialog import ExportDialog, framed
 from studio_ui.pictures.order import (
     HERE,
     KINDS,
@@ -134,6 +134,7 @@ def test_a_picture_is_ordered_with_what_the_window_shows(out: tuple[Driver, Chil
     assert not driver.document.modified or driver.labels()[-1] != "Picture"
     assert "Exported Room.png, 64 × 36 pixels" in dialog.told.text()
     assert dialog.folder_button.isVisible()
+    assert dialog.path.text() == str(tmp_path / "Room 2.png")
     assert not options.project.parent.exists()
 
 
@@ -249,6 +250,17 @@ def test_a_closed_dialog_lets_the_picture_go_on(make: Make, tmp_path: Path) -> N
     driver.until(lambda: again.task is None)
     assert "Stopped" in again.told.text()
     assert sorted(path.name for path in tmp_path.glob("*.png")) == ["Room.png"]
+
+
+def test_the_preview_has_the_shape_of_the_picture() -> None:
+    image = QImage(90, 60, QImage.Format.Format_RGB888)
+    image.fill(Qt.GlobalColor.white)
+    narrow, wide = framed(image, 1.0), framed(image, 3.0)
+    assert (narrow.width(), narrow.height()) == (60, 60)
+    assert (wide.width(), wide.height()) == (180, 60)
+    assert wide.pixelColor(90, 30).lightness() == 255
+    assert wide.pixelColor(10, 30).lightness() == wide.pixelColor(170, 30).lightness() == 34
+    assert framed(QImage(), 2.0).isNull()
 
 
 # --- series -------------------------------------------------------------------------------------------

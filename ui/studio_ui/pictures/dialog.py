@@ -47,9 +47,11 @@ class Preview(QLabel):
         self.setAccessibleName("Preview")
         self._image = QImage()
 
-    def show_image(self, image: QImage) -> None:
-        """Another picture."""
+    def show_image(self, image: QImage, instead: str = "") -> None:
+        """Another picture; where there is none, a word `instead`."""
         self._image = image
+        if image.isNull():
+            self.setText(instead)
         self._fit()
 
     def resizeEvent(self, event: QResizeEvent) -> None:

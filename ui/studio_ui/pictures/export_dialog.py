@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from PySide6.QtGui import QColor, QImage, QPainter
 from PySide6.QtWidgets import QCheckBox, QLineEdit, QToolButton, QWidget
 
 from studio_core.scene.nodes import Camera
@@ -12,12 +13,14 @@ from studio_ui.ask import Filter
 from studio_ui.fields import Combo
 from studio_ui.panels.panel import row
 from studio_ui.pictures.dialog import PictureDialog
-from studio_ui.pictures.forms import LookForm, SizeForm, form_in, labelled
+from studio_ui.pictures.forms import LookForm, SizeForm, form_in, labelled, named
 from studio_ui.pictures.order import HERE, PictureOrder, duration, guessed
+from studio_ui.pictures.work import unused
 
 if TYPE_CHECKING:
     from studio_ui.pictures.feature import PictureOut
 
+SHEET_GROUND = 34  # grey of what is not known yet
 FILTERS = (Filter("PNG picture, as shown", (".png",)), Filter("OpenEXR, linear light", (".exr",)))
 
 
@@ -50,7 +53,7 @@ class ExportDialog(PictureDialog):
         name.setLayout(row(self.path, self.browse, stretch=0))
         bottom = QWidget()
         below = form_in(bottom)
-        below.addRow("", self.measure)
+        below.addRow(named(""), self.measure)
         labelled(below, "Save as", name, "Where the picture is put when it is whole")
         self.path.setAccessibleName("Save as")
         for part in (top, self.size_form, self.look_form, bottom):
@@ -58,7 +61,8 @@ class ExportDialog(PictureDialog):
         self.browse.clicked.connect(self._browse)
         self.size_form.changed.connect(self._changed)
         self.look_form.changed.connect(self._changed)
-        self.preview.show_image(owner.shown_image())
+        self._shown = owner.shown_image()
+        self.camera.currentIndexChanged.connect(self._changed)
         self._changed()
 
     def order(self) -> PictureOrder | None:
@@ -72,6 +76,11 @@ class ExportDialog(PictureDialog):
         look = self._owner.look(self.size_form, self.look_form, measure=self.measure.isChecked())
         self._owner.memory.keep(self.size_form, self.look_form)
         return PictureOrder(self.camera.currentData(), path, look)
+
+    def finished_well(self, text: str) -> None:
+        """The next picture has a name of its own."""
+        self.path.setText(str(unused(self._path())))
+        super().finished_well(text)
 
     def estimate(self) -> str:
         """By the last picture of that quality."""
@@ -98,4 +107,25 @@ class ExportDialog(PictureDialog):
         if path.suffix.lower() in (".png", ".exr") and path.suffix.lower() != suffix:
             self.path.setText(str(path.with_suffix(suffix)))
         if self.task is None:
+            here, size = self.camera.currentData() == HERE, self.size_form.size_()
+            image = framed(self._shown, size.width / size.height) if here else QImage()
+            self.preview.show_image(image, "" if here else "The preview comes with the picture.")
             self.tell(self.estimate())
+
+
+def framed(image: QImage, shape: float) -> QImage:
+    """What a picture of that shape (width over height) will show of what is shown: all that is as high.
+
+    Where it is wider than the window nothing is known of the sides.
+    """
+    if image.isNull():
+        return image
+    width = round(image.height() * shape)
+    if width <= image.width():
+        return image.copy((image.width() - width) // 2, 0, max(width, 1), image.height())
+    made = QImage(width, image.height(), QImage.Format.Format_RGB888)
+    made.fill(QColor(SHEET_GROUND, SHEET_GROUND, SHEET_GROUND))
+    painter = QPainter(made)
+    painter.drawImage((width - image.width()) // 2, 0, image)
+    painter.end()
+    return made

@@ -26,7 +26,7 @@ from studio_ui.pictures.forms import LookForm, SizeForm
 from studio_ui.pictures.memory import PictureMemory
 from studio_ui.pictures.order import FINAL, Look, PictureOrder, Size, duration
 from studio_ui.pictures.series_dialog import SeriesDialog
-from studio_ui.pictures.work import Order, make
+from studio_ui.pictures.work import Order, make, unused
 from studio_ui.settings import Settings
 from studio_ui.tasks import Task
 
@@ -93,12 +93,7 @@ class PictureOut:
 
     def free_path(self, suffix: str) -> Path:
         """A name beside the project that no file has yet."""
-        first = self._beside(suffix)
-        path, number = first, 1
-        while path.exists():
-            number += 1
-            path = first.with_name(f"{first.stem} {number}{suffix}")
-        return path
+        return unused(self._beside(suffix))
 
     def look(self, size: SizeForm, form: LookForm, *, measure: bool = False) -> Look:
         """How pictures are made, by a dialog's fields and what the window does now."""

@@ -14,17 +14,26 @@ from studio_ui.pictures.order import KINDS, MOST_PIXELS, PRESETS, QUALITIES, SAM
 from studio_ui.spin import Spin
 from studio_ui.theme import GAP
 
+LABELS, FIELDS = 104, 26  # pixels: width of labels, height of fields
 _WINDOW, _CUSTOM = "As the window", "Other"
 
 
 def labelled(form: QFormLayout, text: str, field: QWidget, tip: str = "") -> None:
     """A row of a form; what it means is told on both sides."""
-    label = QLabel(text)
+    label = named(text)
     label.setToolTip(tip)
     field.setToolTip(tip)
     field.setAccessibleName(text)
     label.setBuddy(field)
     form.addRow(label, field)
+
+
+def named(text: str) -> QLabel:
+    """A label as wide as those of the forms above and below, at the height of its field."""
+    label = QLabel(text)
+    label.setFixedWidth(LABELS)
+    label.setMinimumHeight(FIELDS)
+    return label
 
 
 def form_in(owner: QWidget) -> QFormLayout:
@@ -63,14 +72,14 @@ class SizeForm(QWidget):
         sides.setSpacing(GAP)
         for field in (self.width_, QLabel("×"), self.height_):
             sides.addWidget(field, 0 if isinstance(field, QLabel) else 1)
-        form.addRow("Pixels", sides)
+        form.addRow(named("Pixels"), sides)
         checks = QHBoxLayout()
         checks.setSpacing(2 * GAP)
         checks.addWidget(self.linked)
         checks.addWidget(self.upright)
         checks.addStretch(1)
-        form.addRow("", checks)
-        form.addRow("", self.told)
+        form.addRow(named(""), checks)
+        form.addRow(named(""), self.told)
         self.preset.currentIndexChanged.connect(self._chosen)
         self.width_.valueChanged.connect(lambda value: self._typed(self.width_, self.height_, value))
         self.height_.valueChanged.connect(lambda value: self._typed(self.height_, self.width_, value))
@@ -158,7 +167,7 @@ class LookForm(QWidget):
         checks.setSpacing(GAP)
         checks.addWidget(self.alpha)
         checks.addWidget(self.lights)
-        form.addRow("", checks)
+        form.addRow(named(""), checks)
         column.addWidget(rows)
         self._choose(self.quality, lambda data: data == quality)
         self._choose(self.samples, lambda data: data == samples)

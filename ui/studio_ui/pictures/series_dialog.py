@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from PySide6.QtCore import Qt
+from PySide6.QtGui import QImage
 from PySide6.QtWidgets import (
     QAbstractItemView,
     QCheckBox,
@@ -24,7 +25,7 @@ from studio_core.scene.transform import Vec3, vec3
 from studio_ui.fields import Combo
 from studio_ui.panels.panel import note, row
 from studio_ui.pictures.dialog import PictureDialog
-from studio_ui.pictures.forms import LookForm, SizeForm, form_in, labelled
+from studio_ui.pictures.forms import LookForm, SizeForm, form_in, labelled, named
 from studio_ui.pictures.order import HERE, SeriesOrder, duration, guessed
 from studio_ui.spin import Spin
 
@@ -76,6 +77,7 @@ class SeriesDialog(PictureDialog):
         self.name = QLineEdit(start.stem)
         self.resume = QCheckBox("Keep pictures that are there")
         self.resume.setToolTip("To go on after an interruption; they should show the same scene")
+        self.preview.show_image(QImage(), "Small pictures appear here while they are made.")
         self._put_together()
         self._times()
         self._changed()
@@ -88,7 +90,7 @@ class SeriesDialog(PictureDialog):
         labelled(turning, "Turn", self.degrees, "360° for a film that repeats without a jump")
         labelled(walking, "Cameras", self.path_list, "Those with a tick, from the top down; drag to reorder")
         for check in (self.closed, self.ease, self.even):
-            walking.addRow("", check)
+            walking.addRow(named(""), check)
         self.pages = QStackedWidget()
         self.pages.addWidget(turn)
         self.pages.addWidget(path)
@@ -110,8 +112,8 @@ class SeriesDialog(PictureDialog):
         labelled(below, "Folder", place, "It is made if it is not there")
         self.folder.setAccessibleName("Folder")
         labelled(below, "Name", self.name, "What the files begin with")
-        below.addRow("", self.files_told)
-        below.addRow("", self.resume)
+        below.addRow(named(""), self.files_told)
+        below.addRow(named(""), self.resume)
         for part in (top, self.pages, times, self.size_form, self.look_form, files):
             self.form_column.addWidget(part)
         self.kind.currentIndexChanged.connect(self._kind)

@@ -64,6 +64,15 @@ def _at(order: Order, camera: str) -> Order:
     return dataclasses.replace(order, cameras=tuple(one or camera for one in order.cameras))
 
 
+def unused(path: Path) -> Path:
+    """The path itself, or with the first number that makes it one where nothing is."""
+    made, number = path, 1
+    while made.exists():
+        number += 1
+        made = path.with_name(f"{path.stem} {number}{path.suffix}")
+    return made
+
+
 def _plain(name: str) -> str:
     made = "".join(c if c.isalnum() or c in "-_ " else "_" for c in name)[:60].strip()
     return made or "picture"
@@ -77,4 +86,4 @@ def _clear(path: Path, since: float) -> None:
                 left.unlink(missing_ok=True)
 
 
-__all__ = ["HERE", "Order", "Seen", "make"]
+__all__ = ["HERE", "Order", "Seen", "make", "unused"]
