@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from PySide6.QtCore import Qt
+from PySide6.QtCore import QPoint, Qt
 from ui_support import Driver, box, room
 
 from studio_core.edits import Add, SetFields
@@ -203,6 +203,11 @@ def test_new_windows_find_place_on_other_walls(driver: Driver) -> None:
     assert len(the_room(driver).placed()) == 4
     followed(driver, form)
     assert "finds no room" in form.doubt.text()
+    assert form.list.item(4).text() == "Window · Left · left out"
+    form.walls[1].click()
+    followed(driver, form)
+    form.list.setCurrentRow(1)
+    assert form.doubt.text() == "This wall is left out."
 
 
 def test_a_number_of_a_window_is_typed_and_dragged_as_one_step(driver: Driver) -> None:
@@ -265,3 +270,21 @@ def test_everything_in_the_form_has_a_name_and_is_reached_by_keyboard(driver: Dr
     for widget in (*form.walls, *form.add.values(), form.remove, form.list, form.kind, form.wall):
         assert widget.accessibleName() or widget.text()
         assert widget.focusPolicy() & Qt.FocusPolicy.TabFocus
+
+
+def test_a_drag_on_the_walls_of_a_chosen_room_looks_around(driver: Driver) -> None:
+    driver.show(room())
+    node, _ = with_room(driver, height=1.0)
+    driver.settle()
+    before, place = driver.session.view, the_room(driver, node).transform
+    steps = len(driver.labels())
+    at = driver.at((0.2, 0.5, 2.2))
+    driver.click((0.2, 0.5, 2.2))
+    assert driver.session.selection == (node,)
+    driver.press(at)
+    driver.move(at + QPoint(40, 5))
+    driver.move(at + QPoint(80, 5))
+    driver.release(at + QPoint(80, 5))
+    assert the_room(driver, node).transform == place
+    assert len(driver.labels()) == steps
+    assert driver.session.view != before

@@ -15,6 +15,7 @@ from studio_core.document import Document
 from studio_core.scene.arranging import is_locked, roots
 from studio_core.scene.diff import Changes
 from studio_core.scene.nodes import Environment, NodeId, Scene
+from studio_core.scene.room import Room
 from studio_core.session import Session
 from studio_core.signal import Signal
 from studio_ui.canvas.drags import Hold, LightDrag, Words, called
@@ -248,6 +249,8 @@ class CanvasTools:
         if self._lit is None:
             picked = self.pick(press)
             if picked is None or not is_held(scene, picked, self._session.selection):
+                return False
+            if isinstance(scene[picked], Room):  # is all around: by its arrows only
                 return False
             point = self.looking.touched(press.x, press.y)
             if point is None or self._viewport.glyph_at(press.x, press.y) is not None:

@@ -140,8 +140,7 @@ class RoomForm(QWidget):
             made = {one.opening for one in room.placed()}
             for number, opening in enumerate(room.openings):
                 item = self.list.item(number)
-                item.setText(_text(room, opening, number_style(self)))
-                item.setForeground(self.palette().text() if number in made else self.palette().mid())
+                item.setText(_text(room, opening, number_style(self), number in made))
             self.list.setCurrentRow(min(current, len(room.openings) - 1))
         shown = min(max(len(room.openings), 1), _ROWS)
         height = self.list.sizeHintForRow(0) if room.openings else self.fontMetrics().height() + GAP
@@ -253,7 +252,7 @@ def _button(text: str, tip: str) -> QToolButton:
     return button
 
 
-def _text(room: Room, opening: Opening, style: NumberStyle) -> str:
+def _text(room: Room, opening: Opening, style: NumberStyle, made: bool) -> str:
     wall = room.walls[opening.wall]
     width, height = style.text(opening.width, "m", with_unit=False), style.text(opening.height, "m")
-    return f"{NAMES[opening.kind]} · {wall} · {width} × {height}"
+    return f"{NAMES[opening.kind]} · {wall} · {f'{width} × {height}' if made else 'left out'}"
