@@ -35,7 +35,7 @@ class Cameras:
     def __init__(self, context: Context, looking: Looking, settings: Settings) -> None:
         self.through: NodeId | None = None
         self.kept = False
-        self.frame = settings.get("camera_frame", USUAL)
+        self.frame: str = settings.get("camera_frame", USUAL)
         if self.frame not in ASPECTS:
             self.frame = USUAL
         self.changed: Signal[[]] = Signal()
@@ -138,7 +138,7 @@ class Cameras:
         self.through, self.kept = None, False
         view, scene = self._context.session.view, self._context.document.scene
         for camera in self.all():
-            if _together(View.of(camera, scene, view.width, view.height), view):
+            if together(View.of(camera, scene, view.width, view.height), view):
                 self.through = camera.id
                 self._context.session.look(self.seen(camera))
                 break
@@ -221,7 +221,7 @@ class Cameras:
         if camera is None or not aspect & Aspect.VIEW:
             return
         view, seen, goal = self._context.session.view, self.seen(camera), self._looking.flight.goal
-        if _same(view, seen) or (goal is not None and _same(goal, seen)):
+        if same(view, seen) or (goal is not None and same(goal, seen)):
             return
         if self.kept and not is_locked(self._context.document.scene, camera.id):
             self._carry(camera)
@@ -252,7 +252,7 @@ class Cameras:
         if camera is None:
             self.through, self.kept = None, False
             self.changed.emit()
-        elif not _same(self._context.session.view, self.seen(camera)) and self._looking.flight.goal is None:
+        elif not same(self._context.session.view, self.seen(camera)) and self._looking.flight.goal is None:
             self._context.feed.step()
             self._context.session.look(self.seen(camera))
 
@@ -282,10 +282,11 @@ def _plain(name: str) -> str:
     return name.replace(":", "_").replace(".", "_")
 
 
-def _together(a: View, b: View) -> bool:
+def together(a: View, b: View) -> bool:
     """Whether two views are from one place in one direction."""
     return bool(np.allclose(a.transform.matrix(), b.transform.matrix(), rtol=0, atol=1e-7))
 
 
-def _same(a: View, b: View) -> bool:
-    return _together(a, b) and abs(a.fov - b.fov) < 1e-6
+def same(a: View, b: View) -> bool:
+    """Whether two views see the same."""
+    return together(a, b) and abs(a.fov - b.fov) < 1e-6

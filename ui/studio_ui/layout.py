@@ -15,7 +15,7 @@ from studio_ui.theme import PANEL_WIDTH
 
 _VERSION = 1  # stored layouts of another number are left alone
 _HIDDEN = ("console",)  # at first
-_TABS = (("history", "jobs", "log"), ("properties", "materials", "lighting", "shading"))
+_TABS = (("history", "cameras", "jobs", "log"), ("properties", "materials", "lighting", "shading"))
 
 
 class Layout:

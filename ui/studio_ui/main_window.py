@@ -16,6 +16,7 @@ from studio_ui.appearance import Appearance
 from studio_ui.arranging import Arranging
 from studio_ui.ask import Ask
 from studio_ui.badge import Badge
+from studio_ui.camera_pictures import CameraPictures
 from studio_ui.cameras import Cameras
 from studio_ui.canvas.choice import CanvasChoice
 from studio_ui.canvas.switch_viewport import SwitchViewport
@@ -136,6 +137,7 @@ class MainWindow(QMainWindow):
         self.commands = Commands(context, self.tools)
         self.viewing = Viewing(context, self.tools.looking, settings)
         self.cameras = Cameras(context, self.tools.looking, settings)
+        self.camera_pictures = CameraPictures(context, self.cameras, settings.folder / "cameras")
         self.aids = ViewAids(context, viewport, self.tools.looking, self.viewing, self.cameras, settings)
         self.transfer = Transfer(context, self.ask, self.files.beside)
         self.importing = Importing(context, self.ask, settings, self.viewing.frame_all)
@@ -184,7 +186,8 @@ class MainWindow(QMainWindow):
         load, save = self.transfer.load_environment, self.files.save
         shelf = EnvironmentShelf(self.context, self.settings, self._samples, load)
         self.transfer.lit.connect(shelf.used)
-        return all_panels(self.context, shelf, load, self.ask, self.settings, save)
+        seen = self.camera_pictures
+        return all_panels(self.context, shelf, load, self.ask, self.settings, save, self.cameras, seen)
 
     def handlers(self) -> dict[str, Callable[[], object]]:
         """By action id."""
@@ -256,6 +259,7 @@ class MainWindow(QMainWindow):
         self.viewport.release()
         self._autosave.stop()
         self.aids.close()
+        self.camera_pictures.close()
         self.cameras.close()
         self.tools.close()
         self.context.feed.close()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Literal, cast
+from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -182,7 +182,7 @@ class Looking:
         found = bounds(scene, [node for node in self._session.selection if node in scene.nodes])
         if found is None:
             return None
-        middle = (found[0] + found[1]) / 2
+        middle: F64 = (found[0] + found[1]) / 2
         place = project(self._session.view, middle)[0]
         seen = bool(np.isfinite(place).all() and (place >= 0).all() and (place <= 1).all())
-        return cast("F64", middle) if seen else None
+        return middle if seen else None

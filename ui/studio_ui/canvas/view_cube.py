@@ -141,7 +141,7 @@ class ViewCube(QWidget):
         if event.type() is QEvent.Type.ToolTip:
             part = self.hovered
             if part is not None:
-                words = "Everything, from the front" if part == "home" else f"From {told(part)}"
+                words = f"From {told(part)}" if isinstance(part, tuple) else "Everything, from the front"
                 QToolTip.showText(self.mapToGlobal(self.rect().bottomLeft()), words, self)
             return True
         return super().event(event)

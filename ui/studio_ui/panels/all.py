@@ -7,8 +7,11 @@ from collections.abc import Callable
 from PySide6.QtCore import Qt
 
 from studio_ui.ask import Ask
+from studio_ui.camera_pictures import CameraPictures
+from studio_ui.cameras import Cameras
 from studio_ui.context import Context
 from studio_ui.environment_shelf import EnvironmentShelf
+from studio_ui.panels.cameras import CamerasPanel
 from studio_ui.panels.console import ConsolePanel
 from studio_ui.panels.history import HistoryPanel
 from studio_ui.panels.jobs import JobsPanel
@@ -29,6 +32,8 @@ def all_panels(
     ask: Ask,
     settings: Settings,
     save: Callable[[], object],
+    cameras: Cameras,
+    pictures: CameraPictures,
 ) -> list[tuple[Panel, Qt.DockWidgetArea]]:
     """The panels in the order of the Window menu; tabs are in `layout`."""
     left, right = Qt.DockWidgetArea.LeftDockWidgetArea, Qt.DockWidgetArea.RightDockWidgetArea
@@ -36,6 +41,7 @@ def all_panels(
     return [
         (OutlinerPanel(context), left),
         (HistoryPanel(context), left),
+        (CamerasPanel(context, cameras, pictures), left),
         (JobsPanel(context), left),
         (LogPanel(context), left),
         (PropertiesPanel(context), right),

@@ -1,0 +1,80 @@
+"""A camera's lens in one line: focal length on full frame, and the vertical angle that it has."""
+
+from __future__ import annotations
+
+from PySide6.QtWidgets import QHBoxLayout, QWidget
+
+from studio_core.params import ParamInfo, param_infos
+from studio_core.scene.nodes import Camera
+from studio_ui.panels.light_fields import to_fov, to_lens
+from studio_ui.sinks import Sink
+from studio_ui.spin import ScrubLabel, Spin
+from studio_ui.theme import GAP
+
+_ANGLE = param_infos(Camera)["fov"]
+_LENS = ParamInfo(
+    "number",
+    "Lens",
+    "Focal length of a 36 × 24 mm camera that sees as much; less is wider",
+    unit="mm",
+    low=round(to_lens(_ANGLE.high), 2),
+    high=round(to_lens(_ANGLE.low)),
+)
+_ALIKE = 1e-6
+
+
+class LensRow(QWidget):
+    """Two numbers for the parameter `fov`; either may be typed, stepped or pulled at the label."""
+
+    def __init__(self, sink: Sink) -> None:
+        super().__init__()
+        self._sink = sink
+        self._fov = 0.0
+        self._gesture = False
+        self.lens, self.angle = Spin(_LENS, decimals=1), Spin(_ANGLE, decimals=1)
+        layout = QHBoxLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.setSpacing(GAP)
+        for spin in (self.lens, self.angle):
+            spin.setToolTip(spin.info.doc)
+            spin.held.connect(self._held)
+            spin.let_go.connect(self._let_go)
+            spin.dropped.connect(self._dropped)
+        label = ScrubLabel("Lens", self.lens)
+        label.setToolTip(_LENS.doc)
+        layout.addWidget(label)
+        layout.addWidget(self.lens, 1)
+        layout.addWidget(self.angle, 1)
+        self.lens.valueChanged.connect(lambda value: self._typed(to_fov(value), self.lens))
+        self.angle.valueChanged.connect(lambda value: self._typed(value, self.angle))
+
+    def show_fov(self, fov: float) -> None:
+        """What the scene has, without telling."""
+        self._fov = fov
+        self.lens.show_value(to_lens(fov))
+        self.angle.show_value(fov)
+
+    def _typed(self, fov: float, spin: Spin) -> None:
+        fov = float(f"{min(max(fov, _ANGLE.low), _ANGLE.high):.6g}")
+        if abs(fov - self._fov) < _ALIKE:
+            return
+        self._fov = fov
+        if spin is self.lens:
+            self.angle.show_value(fov)
+        else:
+            self.lens.show_value(to_lens(fov))
+        give = self._sink.preview if self._gesture else self._sink.apply
+        give("fov", fov)
+
+    def _held(self) -> None:
+        self._gesture = self._sink.begin("fov")
+
+    def _let_go(self) -> None:
+        if self._gesture:
+            self._gesture = False
+            self._sink.commit()
+
+    def _dropped(self) -> None:
+        if self._gesture:
+            self._gesture = False
+            self._sink.cancel()
