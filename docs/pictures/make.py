@@ -1,13 +1,15 @@
-"""Makes the pictures of these pages: `python docs/pictures/make.py room | window | chair`, from a checkout.
+"""Makes the pictures of these pages: `python docs/pictures/make.py room | windows | chair`, from a checkout.
 
-`room` renders the sample room, `window` photographs the window when it has come to rest, `chair` drags a
-chair through the settled room as a hand does and lets it rest, exact and refined.
+`room` renders the sample room, `windows` photographs the window when it has come to rest (both themes, 100
+and 150 %; `window THEME PERCENT` makes one of them), `chair` drags a chair through the settled room as a hand
+does and lets it rest, exact and refined.
 """
 
 from __future__ import annotations
 
 import dataclasses
 import os
+import subprocess
 import sys
 import tempfile
 import time
@@ -21,6 +23,7 @@ ROOT = HERE.parents[1]
 sys.path[:0] = [str(ROOT), str(ROOT / "ui"), str(ROOT / "plugins")]
 
 SIZE = (640, 360)
+WINDOW = (1440, 900)
 STEPS, REST = 32, 24  # pictures of the drag; how long the last one stays, in pictures
 PER_PICTURE = 70  # milliseconds
 WAY = ((0.0, 0.0), (1.55, 0.55))  # of the chair over the floor, metres in x and z
@@ -34,19 +37,32 @@ def room() -> None:
     raise SystemExit(main(["demo", "--headless", "-o", str(HERE / "living-room.png")]))
 
 
-def window() -> None:
+def windows() -> None:
+    """The window in both themes, plain and on a display that asks for everything half as large again."""
+    for theme in ("dark", "light"):
+        for percent in (100, 150):
+            command = [sys.executable, __file__, "window", theme, str(percent)]
+            subprocess.run(command, check=True, env={**os.environ, "QT_SCALE_FACTOR": str(percent / 100)})
+
+
+def window(theme: str = "dark", percent: str = "100") -> None:
     """The window, at rest, with its error measured."""
     os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
     os.environ["LUCARNE_STATE"] = tempfile.mkdtemp(prefix="lucarne-pictures-")
+    from PIL import Image
+    from PySide6.QtGui import QImage
     from PySide6.QtWidgets import QApplication
 
     from studio.app import assemble
     from studio.samples import sample
     from studio_ui.feed import Freshness
+    from studio_ui.settings import Settings, state_folder
 
     application = QApplication(sys.argv[:1])
-    studio = assemble()
-    studio.window.resize(1440, 900)
+    settings = Settings(state_folder())
+    settings.set("theme", theme)
+    studio = assemble(settings=settings)
+    studio.window.resize(*WINDOW)
     studio.window.show()
     errors: list[object] = []
     studio.context.feed.measured.connect(lambda error: errors.append(error))
@@ -66,9 +82,12 @@ def window() -> None:
     wait(2.0)
     chosen = next(n for n in studio.context.document.scene.nodes.values() if n.name == "Chair at the back")
     studio.context.session.select([chosen.id])
-    studio.window.docks["shading"].raise_()
+    studio.window.docks["lighting" if theme == "light" else "properties"].raise_()
     wait(0.5)
-    studio.window.grab().save(str(HERE / "window.png"))
+    shown = studio.window.grab().toImage().convertToFormat(QImage.Format.Format_RGB888)
+    rows = np.frombuffer(shown.constBits(), np.uint8).reshape(shown.height(), shown.bytesPerLine())
+    pixels = rows[:, : 3 * shown.width()].reshape(shown.height(), shown.width(), 3)
+    Image.fromarray(pixels).save(HERE / f"window-{theme}-{percent}.webp", quality=88, method=6)
     studio.close()
 
 
@@ -127,4 +146,4 @@ def chair() -> None:
 
 
 if __name__ == "__main__":
-    {"room": room, "window": window, "chair": chair}[sys.argv[1]]()
+    {"room": room, "windows": windows, "window": window, "chair": chair}[sys.argv[1]](*sys.argv[2:])
