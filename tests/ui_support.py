@@ -162,6 +162,7 @@ class Answers:
     files: list[Path] = field(default_factory=list)
     target: Path | None = None
     asked: list[str] = field(default_factory=list)
+    text_: str | None = None
     left: list[Leftover] = field(default_factory=list)
     questions: list[ImportQuestion] = field(default_factory=list)
     versions: list[Outline] = field(default_factory=list)
@@ -209,6 +210,10 @@ class Answers:
 
     def save_file(self, title: str, suggested: Path, filters: Sequence[Filter]) -> Path | None:
         return self.target
+
+    def text(self, title: str, label: str, suggested: str) -> str | None:
+        self.asked.append(title)
+        return self.text_
 
     def folder(self, title: str) -> Path | None:
         return self.target

@@ -79,6 +79,10 @@ class Ask(Protocol):
         """A file to write; whether it may be replaced has been asked."""
         ...
 
+    def text(self, title: str, label: str, suggested: str) -> str | None:
+        """A name or another short text."""
+        ...
+
     def folder(self, title: str) -> Path | None:
         """A folder to write into."""
         ...

@@ -10,6 +10,7 @@ from PySide6.QtWidgets import (
     QDialog,
     QDialogButtonBox,
     QFileDialog,
+    QInputDialog,
     QLabel,
     QMessageBox,
     QPlainTextEdit,
@@ -143,6 +144,11 @@ class Dialogs:
             suffix = next((f.extensions[0] for f in filters if f.text() == chosen), known[0])
             path = path.with_name(path.name + suffix)
         return path
+
+    def text(self, title: str, label: str, suggested: str) -> str | None:
+        """A short text."""
+        found, accepted = QInputDialog.getText(self._parent, title, label, text=suggested)
+        return found if accepted else None
 
     def folder(self, title: str) -> Path | None:
         """A folder to write into."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import base64
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from itertools import pairwise
 
 from PySide6.QtCore import QByteArray, Qt
@@ -54,6 +54,7 @@ class Layout:
         for name in _HIDDEN:
             docks[name].hide()
         self._first = QByteArray()
+        self._before: QByteArray | None = None  # the picture was alone
 
     def handlers(self) -> dict[str, Callable[[], object]]:
         """By action id."""
@@ -79,10 +80,43 @@ class Layout:
 
     def reset(self) -> None:
         """The docks as at the first start."""
-        self._window.restoreState(self._first, _VERSION)
+        self.set_state(self._first)
+
+    def arrange(self, shown: Collection[str], front: Sequence[str]) -> None:
+        """Those panels in their first places, some in front; names of no panel are left out."""
+        self.set_state(self._first)
+        for name, dock in self.docks.items():
+            dock.setVisible(name in shown)
+        for name in front:
+            if name in self.docks:
+                self.docks[name].raise_()
+
+    def state(self) -> QByteArray:
+        """Where the docks are."""
+        return self._window.saveState(_VERSION)
+
+    def set_state(self, state: QByteArray) -> None:
+        """Put the docks where they were."""
+        self._before = None
+        self._window.restoreState(state, _VERSION)
+
+    @property
+    def picture_only(self) -> bool:
+        """Whether all panels were hidden together, and still are."""
+        return self._before is not None and all(dock.isHidden() for dock in self.docks.values())
+
+    def toggle_picture_only(self) -> None:
+        """Hide all panels; once more shows those again that were there."""
+        if self.picture_only and self._before is not None:
+            self.set_state(self._before)
+            return
+        self._before = self.state()
+        for dock in self.docks.values():
+            dock.hide()
 
     def keep(self) -> None:
         """Remember how it is."""
-        stored = {"geometry": self._window.saveGeometry(), "layout": self._window.saveState(_VERSION)}
+        state = self._before if self.picture_only and self._before is not None else self.state()
+        stored = {"geometry": self._window.saveGeometry(), "layout": state}
         for name, state in stored.items():
             self._settings.set(name, base64.b64encode(state.data()).decode())

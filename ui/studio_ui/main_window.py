@@ -38,6 +38,7 @@ from studio_ui.help import Help
 from studio_ui.hint_bar import HintBar
 from studio_ui.keyboard import Keyboard
 from studio_ui.layout import Layout
+from studio_ui.layouts import Layouts
 from studio_ui.magnet import Magnet
 from studio_ui.menus import Menus
 from studio_ui.palette import Palette, menu_entries
@@ -109,6 +110,7 @@ class MainWindow(QMainWindow):
         self.menus = Menus(self.menuBar(), self.actions_, self.cameras, self.files)
         self.menus.offer_samples(self._samples)
         self.menus.offer_panels(self.docks)
+        self.layouts.offer(self.actions_.menus["Window/Layouts"])
         self._make_bar()
         wearers = [
             self.front.set_theme,
@@ -147,6 +149,7 @@ class MainWindow(QMainWindow):
         self.canvas = CanvasChoice(viewport, settings, context.journal.write)
         self.appearance = Appearance(self.preferences, viewport, self.canvas)
         self.layout_ = Layout(self, settings, self._panels())
+        self.layouts = Layouts(self.layout_, settings, self.ask)
         self.panels, self.docks = self.layout_.panels, self.layout_.docks
         self.keyboard = Keyboard(self, lambda: viewport.inner.widget, self.docks)
         chosen = PreferencesFeature(
@@ -173,6 +176,7 @@ class MainWindow(QMainWindow):
             self.aids,
             self.appearance,
             self.layout_,
+            self.layouts,
             self.palette_,
             chosen,
             self.keyboard,

@@ -8,5 +8,11 @@ ITEMS: tuple[Item, ...] = (
     ActionSpec("window.next", "Next panel", "Window", "F6",
                "Picture, toolbar and panels in turn, without a mouse"),
     ActionSpec("window.previous", "Previous panel", "Window", "Shift+F6"),
+    ActionSpec("window.furnish", "Furnish", "Window/Layouts", "", "Outliner, properties and materials"),
+    ActionSpec("window.light", "Light", "Window/Layouts", "", "Environments, lamps and shading"),
+    ActionSpec("window.picture_only", "Picture only", "Window/Layouts", "Tab",
+               "Hide all panels; once more shows them again", checked="picture_only", canvas=True),
+    ActionSpec("window.save_layout", "Save layout…", "Window/Layouts", "",
+               "Keep the panels as they are now under a name"),
     ActionSpec("window.reset", "Reset layout", "Window", "", "The panels as at the first start"),
 )  # fmt: skip

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from PySide6.QtCore import Qt
+from PySide6.QtCore import QSize, Qt
 from PySide6.QtGui import QAction
 from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QScrollArea, QToolButton, QVBoxLayout, QWidget
 from shiboken6 import isValid
@@ -64,7 +64,7 @@ class Panel(QWidget):
 
     def scroller(self, into: QVBoxLayout | None = None) -> QVBoxLayout:
         """A column inside a vertical scroll area that fills the rest of the panel, or of `into`."""
-        area = QScrollArea()
+        area = Scroller()
         area.setWidgetResizable(True)
         area.setFocusPolicy(Qt.FocusPolicy.NoFocus)  # what is in it scrolls into sight
         area.setFrameShape(QFrame.Shape.NoFrame)
@@ -83,6 +83,19 @@ class Panel(QWidget):
         made.setSpacing(GAP)
         column.addLayout(made)
         return made
+
+
+class Scroller(QScrollArea):
+    """Scrolls up and down alone: it is never narrower than what is in it."""
+
+    def minimumSizeHint(self) -> QSize:
+        """As wide as its content and the scroll bar."""
+        found = super().minimumSizeHint()
+        inside = self.widget()
+        if inside is not None:
+            wide = inside.minimumSizeHint().width() + self.verticalScrollBar().sizeHint().width()
+            found.setWidth(max(found.width(), wide))
+        return found
 
 
 def row(*widgets: QWidget, stretch: int = -1) -> QHBoxLayout:
