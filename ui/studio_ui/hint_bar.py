@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QSizePolicy, QToolButton
 
 from studio_core.scene.diff import Aspect, Changes
 from studio_core.scene.nodes import Scene
 from studio_ui.context import Context, Subscriptions
+from studio_ui.fitting import show_what_fits
 from studio_ui.icons import icon
 from studio_ui.settings import Settings
 from studio_ui.theme import Theme
@@ -18,7 +20,7 @@ STEPS = (
 )
 
 
-_HEIGHT = 32
+_HEIGHT, _MARGIN, _GAP = 32, 10, 22
 
 
 class HintBar(QFrame):
@@ -33,8 +35,8 @@ class HintBar(QFrame):
         self._done: set[Aspect] = set()
         self._labels = [QLabel() for _ in STEPS]
         layout = QHBoxLayout(self)
-        layout.setContentsMargins(12, 3, 6, 3)
-        layout.setSpacing(22)
+        layout.setContentsMargins(_MARGIN, 3, _MARGIN, 3)
+        layout.setSpacing(_GAP)
         for label in self._labels:
             layout.addWidget(label)
         layout.addStretch(1)
@@ -78,9 +80,21 @@ class HintBar(QFrame):
             if len(self._done) == len(STEPS):
                 self.dismiss()
 
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        """What comes next is told before what comes later."""
+        super().resizeEvent(event)
+        self._fit()
+
+    def _fit(self) -> None:
+        done = [aspect in self._done for aspect, _ in STEPS]
+        order = sorted(range(len(STEPS)), key=lambda i: done[i])
+        room = self.width() - self._close.sizeHint().width() - 2 * _MARGIN
+        show_what_fits(room, [self._labels[i] for i in order], _GAP)
+
     def _write(self) -> None:
         for number, (label, (aspect, text)) in enumerate(zip(self._labels, STEPS, strict=True), 1):
             label.setText(f"✓  {text}" if aspect in self._done else f"{number}  {text}")
             label.setProperty("role", "dim" if aspect in self._done else "")
             label.style().unpolish(label)
             label.style().polish(label)
+        self._fit()

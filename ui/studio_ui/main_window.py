@@ -7,7 +7,7 @@ from pathlib import Path
 
 from PySide6.QtCore import Qt, QTimer
 from PySide6.QtGui import QCloseEvent
-from PySide6.QtWidgets import QMainWindow, QToolBar, QWidget
+from PySide6.QtWidgets import QMainWindow
 
 from studio_core.folders import user_cache
 from studio_core.shading.scheduler import Executor
@@ -55,6 +55,7 @@ from studio_ui.rooms import Rooms
 from studio_ui.settings import Settings
 from studio_ui.shortcuts import Shortcuts
 from studio_ui.status import StatusBar
+from studio_ui.toolbar import Toolbar
 from studio_ui.transfer import Transfer
 from studio_ui.view_aids import ViewAids
 from studio_ui.view_controls import ViewControls
@@ -115,6 +116,7 @@ class MainWindow(QMainWindow):
         wearers = [
             self.front.set_theme,
             self.aids.set_theme,
+            self.toolbar.set_theme,
             *(panel.set_theme for panel in self.panels.values()),
         ]
         self.appearance.start([self.actions_.set_theme, viewport.set_theme, self.hints.set_theme, *wearers])
@@ -202,17 +204,10 @@ class MainWindow(QMainWindow):
         return {}
 
     def _make_bar(self) -> None:
-        bar = QToolBar("Toolbar")
-        bar.setObjectName("toolbar")
-        bar.setMovable(False)
-        self.actions_.fill_bar(bar)
-        room = QWidget()
-        room.setSizePolicy(room.sizePolicy().Policy.Expanding, room.sizePolicy().Policy.Preferred)
-        bar.addWidget(room)
         self.view_controls = ViewControls(self.context, self.cameras)
-        bar.addWidget(self.view_controls)
-        self.addToolBar(bar)
-        self.keyboard.start([bar, self.statusBar()], self.actions_.menus["Object"])
+        self.toolbar = Toolbar(self.actions_, self.view_controls)
+        self.addToolBar(self.toolbar)
+        self.keyboard.start([self.toolbar, self.status], self.actions_.menus["Object"])
 
     def _follow(self) -> None:
         self._autosave = QTimer(self)

@@ -5,17 +5,22 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
-from PySide6.QtCore import QTimer
-from PySide6.QtWidgets import QLabel, QStatusBar
+from PySide6.QtCore import QSize, Qt, QTimer
+from PySide6.QtGui import QResizeEvent
+from PySide6.QtWidgets import QLabel, QStatusBar, QWidget
 
 from studio_core.scene.nodes import Scene
 from studio_core.shading.artifacts import MeasuredError
 from studio_ui.canvas.viewport import Probe
 from studio_ui.feed import Freshness, Shown
+from studio_ui.fitting import show_what_fits
 from studio_ui.journal import Entry
 from studio_ui.number_style import number_style
 
 _SHOWN_MS = 9000
+_GAP = 6  # pixels that Qt leaves between the parts
+_MESSAGE, _PIXEL = 120, 200
+"""Pixels that are kept for messages, and for what is under the mouse."""
 _ERROR = "Relative error of the picture against brute force, measured at random places while nothing moves"
 _VERTICES = "Points that were lit, of all shading vertices"
 _DIRECTIONS = "Directions that light came from"
@@ -63,6 +68,15 @@ class StatusBar(QStatusBar):
         self._clear.setSingleShot(True)
         self._clear.timeout.connect(self.message.clear)
 
+    def minimumSizeHint(self) -> QSize:
+        """As narrow as the window becomes."""
+        return QSize(0, super().minimumSizeHint().height())
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        """Less is told where there is less room."""
+        super().resizeEvent(event)
+        self._fit()
+
     def tell(self, entry: Entry) -> None:
         """A line of the journal, for a while."""
         self.say(entry.text, "" if entry.level == "note" else entry.level)
@@ -79,6 +93,7 @@ class StatusBar(QStatusBar):
     def show_backend(self, label: str) -> None:
         """Which backend computes."""
         self.backend.setText(label)
+        self._fit()
 
     def show_picture(self, shown: Shown) -> None:
         """How the picture was computed."""
@@ -90,6 +105,7 @@ class StatusBar(QStatusBar):
         counts = counted(radiance.counts)
         self.vertices.setToolTip("\n".join([_VERTICES, *counts]))
         self.directions.setToolTip("\n".join([_DIRECTIONS, *counts]))
+        self._fit()
 
     def show_freshness(self, state: Freshness) -> None:
         """How the picture stands to the scene."""
@@ -119,6 +135,14 @@ class StatusBar(QStatusBar):
         far = math.isfinite(probe.distance)
         place = f", {number_style(self).text(probe.distance, 'm', 2)}" if far else ""
         self.pixel.setText(f"{name}{place}: {red:.3g} {green:.3g} {blue:.3g}")
+
+    def _fit(self) -> None:
+        """The picture's numbers go first; a place stays for messages and for what is under the mouse."""
+        lesser = (self.time, self.backend, self.vertices, self.directions)
+        own = (self.message, self.pixel, *lesser)
+        others = self.findChildren(QWidget, options=Qt.FindChildOption.FindDirectChildrenOnly)
+        fixed = sum(w.sizeHint().width() + _GAP for w in others if w not in own and not w.isHidden())
+        show_what_fits(self.width() - fixed - _MESSAGE - _PIXEL, lesser, _GAP)
 
 
 def counted(counts: Mapping[str, int]) -> list[str]:

@@ -90,6 +90,7 @@ QToolButton:hover { background: $raised; }
 QToolButton:focus { border-color: $accent; }
 QToolButton:pressed, QToolButton:checked { background: $accent; color: $on_accent; }
 QToolButton::menu-indicator { image: none; }
+QToolButton#qt_toolbar_ext_button { padding: 0; border: none; }
 QToolButton[role="filter"] { color: $dim; padding: 2px 5px; }
 QToolButton[role="filter"]:checked { background: $raised; color: $text; }
 QToolButton[role="problem"] { color: $problem; padding: 1px 6px; }

@@ -49,9 +49,10 @@ class ViewControls(QWidget):
         self.camera.setAccessibleName("Camera")
         self.transform.setAccessibleName("View transform")
         self.camera.setToolTip("Look through a camera of the scene")
-        self.camera.setMinimumWidth(120)
+        self.camera.setMinimumWidth(90)
         self.exposure = NumberField("exposure", _EXPOSURE, _Exposure(context))
-        self.exposure.setFixedWidth(230)
+        self.exposure.setMinimumWidth(130)
+        self.exposure.setMaximumWidth(230)
         self.transform.setToolTip("How light becomes what the display shows")
         self.transform.setMinimumWidth(150)
         for kind in KINDS:
