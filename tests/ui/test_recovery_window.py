@@ -144,7 +144,7 @@ def words(dialog: object) -> str:
 def test_the_dialog_tells_both_versions_apart(qapp: QApplication) -> None:
     dialog = RecoveryDialog(None, leftover())
     text = words(dialog)
-    for part in ("flat", "5 objects", "3 objects", "Move chair, Turn light", "9 September 2001"):
+    for part in ("flat", "5 objects", "3 objects", "Done last: Move chair", "Turn light", "9 September 2001"):
         assert part in text
     assert "2 objects more, 1 camera fewer" in text
     assert dialog.answer == "later"

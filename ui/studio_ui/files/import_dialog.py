@@ -55,6 +55,8 @@ class ImportDialog(QDialog):
         self.centre.setChecked(guess.centre)
         for box in (self.stand, self.centre, self.remember):
             box.setVisible(not question.correcting)
+        self.unit.setAccessibleName("Unit of the file")
+        self.axis.setAccessibleName("Axis that points up")
         self._lay_out()
         self.unit.currentIndexChanged.connect(lambda _: self._unit_chosen())
         self.factor.valueChanged.connect(lambda _: self._factor_typed())
@@ -96,7 +98,7 @@ class ImportDialog(QDialog):
         form.setHorizontalSpacing(12)
         counts = f"{question.triangles:,} triangles, {question.materials} materials"
         form.addRow("In it", QLabel(counts))
-        form.addRow("Unit of the file" if not question.correcting else "Size", self.unit)
+        form.addRow("Unit of the file" if not question.correcting else "Correction", self.unit)
         form.addRow("Factor", self.factor)
         form.addRow("Axis", self.axis)
         form.addRow("Size", self.size) if not question.correcting else form.addRow("Then", self.size)

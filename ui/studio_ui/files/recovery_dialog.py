@@ -53,7 +53,7 @@ class RecoveryDialog(QDialog):
         if difference:
             column.addWidget(_words(difference))
         if left.found.saved is not None:
-            drop = "Opening the saved version discards the recovered one as soon as you change or close it."
+            drop = "If you open the saved version, the recovered one is dropped."
             column.addWidget(_words(drop, "dim"))
         buttons = QDialogButtonBox()
         role = QDialogButtonBox.ButtonRole
@@ -68,6 +68,8 @@ class RecoveryDialog(QDialog):
         buttons.rejected.connect(self.reject)
         self.recovered.setDefault(True)
         column.addWidget(buttons)
+        wide = self.sizeHint().width()
+        self.resize(wide, column.heightForWidth(wide))  # words that wrap are not in the size hint
 
     def _choose(self, answer: Recover) -> None:
         self.answer = answer
@@ -158,15 +160,16 @@ def _version(
     words = QVBoxLayout()
     words.setSpacing(3)
     if title:
-        words.addWidget(_words(title, "title"))
+        words.addWidget(_line(title, "title"))
     if revision is not None:
-        words.addWidget(_words(when_title(revision.time), "title" if not title else ""))
+        words.addWidget(_line(when_title(revision.time), "title" if not title else ""))
     if told is not None:
-        words.addWidget(_words(f"{told.objects} objects, {told.materials} materials", "dim"))
-        if told.steps:
-            words.addWidget(_words("Last: " + ", ".join(told.steps), "dim"))
+        words.addWidget(_line(f"{told.objects} objects, {told.materials} materials", "dim"))
+        for number, step in enumerate(told.steps):
+            words.addWidget(_line(step if number else f"Done last: {step}", "dim"))
     words.addStretch(1)
     layout.addLayout(words, 1)
+    made.setMinimumSize(made.sizeHint())
     return made
 
 
@@ -184,6 +187,15 @@ def _picture(image: QImage | None) -> QLabel:
         label.setText("No picture")
         label.setFrameShape(QFrame.Shape.StyledPanel)
         label.setProperty("role", "dim")
+    return label
+
+
+def _line(text: str, role: str = "") -> QLabel:
+    """One line, as wide as the picture; its end is left out where it is longer."""
+    label = _words(text, role)
+    label.setWordWrap(False)
+    label.setText(label.fontMetrics().elidedText(text, Qt.TextElideMode.ElideRight, _PICTURE[0]))
+    label.setToolTip(text)
     return label
 
 
