@@ -110,7 +110,7 @@ def acquire(project: Path, *, take_over: bool = False, me: Holder | None = None)
     """
     path = lock_path(project)
     me = me or this_process()
-    with explained(project, "locked"):
+    with explained(project, "opened for saving"):
         for _ in range(_TRIES):
             flags = os.O_RDWR | os.O_CREAT | getattr(os, "O_CLOEXEC", 0) | getattr(os, "O_NOFOLLOW", 0)
             handle = os.open(path, flags, 0o644)
@@ -131,7 +131,7 @@ def acquire(project: Path, *, take_over: bool = False, me: Holder | None = None)
             finally:
                 if not kept:
                     os.close(handle)
-        raise ProjectError(f"{project.name} could not be locked: its lock keeps changing hands")
+        raise ProjectError(f"{project.name} could not be opened for saving: its lock keeps changing hands")
 
 
 def holder_of(project: Path) -> Holder | None:

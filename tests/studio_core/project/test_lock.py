@@ -169,7 +169,7 @@ def test_a_damaged_lock_file_holds_nothing(project: Path) -> None:
 
 
 def test_a_folder_that_is_gone_is_said(tmp_path: Path) -> None:
-    with pytest.raises(ProjectError, match=r"a\.lucarne could not be locked: there is no such"):
+    with pytest.raises(ProjectError, match=r"a\.lucarne could not be opened for saving: there is no such"):
         acquire(tmp_path / "gone" / "a.lucarne")
 
 
@@ -178,7 +178,7 @@ def test_a_link_in_the_place_of_the_lock_is_not_followed(project: Path, tmp_path
     precious = tmp_path / "precious.txt"
     precious.write_text("do not lose")
     lock_path(project).symlink_to(precious)
-    with pytest.raises(ProjectError, match=r"room\.lucarne could not be locked"):
+    with pytest.raises(ProjectError, match=r"room\.lucarne could not be opened for saving"):
         acquire(project)
     assert precious.read_text() == "do not lose"
 
