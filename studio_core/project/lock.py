@@ -237,6 +237,7 @@ def _parse(data: bytes) -> Holder | None:
         holder = Holder(**value)
         if not all(isinstance(text, str) for text in (holder.host, holder.user, holder.started)):
             return None
-        return holder if type(holder.pid) is int and float(holder.since) >= 0 else None
+        known = bool(holder.host) and type(holder.pid) is int and float(holder.since) >= 0
+        return holder if known else None
     except (ValueError, TypeError, RecursionError):
         return None

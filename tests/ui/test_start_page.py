@@ -11,6 +11,7 @@ from PySide6.QtCore import Qt
 from ui_support import Answers, Driver, Make, room
 
 from studio_core.edits import SetFields
+from studio_core.project.store import save
 from studio_ui.files.recent import RecentProject, folder_text, shared_names, when
 from studio_ui.files.thumbnails import LONGEST, Thumbnails, read_small, small_picture
 
@@ -61,6 +62,16 @@ def test_recent_projects_have_pictures_and_open(make: Make, tmp_path: Path) -> N
     driver.bot.mouseClick(card, Qt.MouseButton.LeftButton)
     driver.until(lambda: driver.window.files.path == path)
     assert page(driver).isHidden()
+
+
+def test_a_project_that_was_only_looked_at_has_a_picture_too(make: Make, tmp_path: Path) -> None:
+    path = tmp_path / "flat.lucarne"
+    save(path, room())
+    driver = make()
+    driver.window.files.open(path)
+    driver.until(lambda: driver.feed.last is not None)
+    driver.do("file.new")
+    driver.until(lambda: any(card.image is not None for card in page(driver).projects.cards))
 
 
 def test_what_is_missing_is_greyed_and_can_be_removed(make: Make, tmp_path: Path) -> None:

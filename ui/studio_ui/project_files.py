@@ -353,6 +353,9 @@ class ProjectFiles:
     def _leave(self, path: Path | None, lock: ProjectLock | None = None) -> None:
         """Let go of the file behind the document and take another one."""
         old, self._lock = self._lock, lock
+        picture = self.keeper.picture(self.path) if self.path is not None and not self.modified else None
+        if picture is not None:
+            self._executor.submit(picture)
         self.keeper.left()
         if old is not None and old is not lock:
             self._executor.submit(old.release)

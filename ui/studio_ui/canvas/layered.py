@@ -1,4 +1,4 @@
-"""What lies over the canvas: bars at its top, and things that fill it (start page, what a drop would do)."""
+"""What lies over the canvas: bars at its lower edge, and what fills it (start page, what a drop would do)."""
 
 from __future__ import annotations
 
@@ -6,7 +6,8 @@ from PySide6.QtCore import QEvent, QObject, QSize
 from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QWidget
 
-_MARGIN = 10
+_MARGIN, _GAP = 10, 6
+_BOTTOM = 44  # above the badge that says how fresh the picture is
 
 
 class Layered(QWidget):
@@ -27,7 +28,7 @@ class Layered(QWidget):
         self._take(widget)
 
     def bar(self, widget: QWidget) -> None:
-        """A bar below the earlier ones, above all fillers, as high as it wants."""
+        """A bar below the earlier ones, over all fillers, as high as it wants."""
         self._bars.append(widget)
         self._take(widget)
 
@@ -56,12 +57,12 @@ class Layered(QWidget):
         self._canvas.setGeometry(self.rect())
         for widget in self._fillers:
             widget.setGeometry(self.rect())
-        top, width = _MARGIN, max(self.width() - 2 * _MARGIN, 0)
-        for widget in self._bars:
+        bottom, width = self.height() - _BOTTOM, max(self.width() - 2 * _MARGIN, 0)
+        for widget in reversed(self._bars):
             if widget.isHidden():
                 continue
             across = min(width, max(widget.sizeHint().width(), widget.minimumWidth()))
             height = widget.heightForWidth(across) if widget.hasHeightForWidth() else -1
             height = height if height > 0 else widget.sizeHint().height()
-            widget.setGeometry((self.width() - across) // 2, top, across, height)
-            top += height + 6
+            widget.setGeometry((self.width() - across) // 2, bottom - height, across, height)
+            bottom -= height + _GAP

@@ -77,7 +77,7 @@ class DropOverlay(QWidget):
         box = QRectF(metrics.boundingRect(0, 0, room, 400, flags, self.text))
         box = QRectF(0, 0, box.width() + 28, box.height() + 14)
         box.moveCenter(QPointF(self.width() / 2, 0))
-        box.moveBottom(self.height() - 26)  # bars are at the top
+        box.moveTop(26)
         painter.setPen(QPen(tint, 1))
         painter.setBrush(_PILL)
         painter.drawRoundedRect(box, 8, 8)
