@@ -26,6 +26,7 @@ from studio_core.scene.topology import (
 
 FLAT = 4.0  # faces lower, and T-junctions nearer, than this many welding tolerances
 REPAIR_ROUNDS = 4
+CAVITY_WORK = 10_000_000  # parts times faces
 NO_VOLUME = 1e-4  # |volume| / area^1.5 of a closed part that is a folded sheet (sphere: 0.094)
 
 
@@ -90,7 +91,7 @@ def surface(geometry: Geometry) -> Surface:
     Vertices within the tolerance are welded, degenerate faces and exact doubles dropped, border edges split
     at T-junctions. Each part whose winding can be made consistent is: closed ones outwards, others the way
     most of their area is wound. A face is one-sided only where its part is closed and was not inside-out in
-    the file (an inside-out box may well be a room).
+    the file (an inside-out box may well be a room), unless it is the wall of a cavity in another closed part.
     """
     near = tolerance(geometry.positions[np.unique(geometry.faces)])
     points, index = weld(geometry.positions, near)
@@ -276,7 +277,42 @@ def _oriented(made: Surface) -> Surface:
     closed = _closed(made, part, across) if not turned.any() else _closed(made, *_parts(made))
     volume = _volume(made, part)
     inside_out = closed & (volume < -NO_VOLUME)
-    made = made.flip(inside_out)
-    two_sided = ~closed | (volume < NO_VOLUME)  # inside-out parts included
+    hollow = _cavities(made, part, inside_out, closed & (volume > NO_VOLUME))
+    made = made.flip(inside_out & ~hollow)
+    two_sided = ~closed | ((volume < NO_VOLUME) & ~hollow)  # other inside-out parts included
     across = partners(made.points, made.faces, edges(made.faces))
     return dataclasses.replace(made, partner=across, two_sided=two_sided)
+
+
+def _cavities(made: Surface, part: Ints, inside_out: Bools, solid: Bools) -> Bools:
+    """(F,) whether a face's inside-out part is the wall of a cavity: a solid part goes all round it.
+
+    Not looked for where that would take long, as among thousands of leaves.
+    """
+    found = np.zeros(len(part), bool)
+    hollow = np.unique(part[inside_out])
+    if not len(hollow) or not solid.any() or len(hollow) * int(solid.sum()) > CAVITY_WORK:
+        return found
+    order = np.argsort(part, kind="stable")
+    numbers, first = np.unique(part[order], return_index=True)
+    corners = made.points[made.faces[order]]
+    low = np.minimum.reduceat(corners.min(axis=1), first)
+    high = np.maximum.reduceat(corners.max(axis=1), first)
+    rows = np.split(order, first[1:])
+    solid_part = solid[order[first]]
+    for k in np.flatnonzero(np.isin(numbers, hollow)):
+        round_it = solid_part & (low < low[k]).all(axis=1) & (high[k] < high).all(axis=1)
+        point = made.points[made.faces[rows[k][0], 0]]
+        if any(_turns(made, rows[other], point) > 0.5 for other in np.flatnonzero(round_it)):
+            found[rows[k]] = True
+    return found
+
+
+def _turns(made: Surface, row: Ints, point: Floats) -> float:
+    """How often some faces go round a point (van Oosterom 1983)."""
+    a, b, c = (made.points[made.faces[row, k]] - point for k in range(3))
+    far, wide, high = (np.linalg.norm(v, axis=1) for v in (a, b, c))
+    triple = (a * np.cross(b, c)).sum(axis=1)
+    below = far * wide * high + (a * b).sum(axis=1) * high
+    below += (b * c).sum(axis=1) * far + (c * a).sum(axis=1) * wide
+    return float(2 * np.arctan2(triple, below).sum() / (4 * np.pi))

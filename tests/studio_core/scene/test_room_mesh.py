@@ -189,8 +189,11 @@ def test_rooms_of_one_shape_share_their_mesh() -> None:
     assert room_geometry(higher).key == key
 
 
-def test_the_shading_mesh_of_an_open_room_has_one_side_and_no_long_edge() -> None:
-    openings = (Opening(), Opening(kind="door", wall=1, sill=0.0, width=0.9, height=2.05))
+DOOR = Opening(kind="door", wall=1, sill=0.0, width=0.9, height=2.05)
+
+
+@pytest.mark.parametrize("openings", [(), (DOOR,), (Opening(), DOOR)], ids=["closed", "door", "window"])
+def test_the_shading_mesh_of_a_room_has_one_side_and_no_long_edge(openings: tuple[Opening, ...]) -> None:
     geometry = room_geometry(dataclasses.replace(PLAIN, openings=openings, skirting=0.08))
     assert (prepare(geometry).back == -1).all()
     mesh = shade_mesh(geometry, 0.4)

@@ -49,6 +49,30 @@ def test_an_inside_out_box_is_turned_and_can_be_seen_from_both_sides() -> None:
     assert made.two_sided.all()
 
 
+def within(outer: Geometry, size: float, at: tuple[float, float, float]) -> Geometry:
+    """A solid with an inside-out box of that size about a place."""
+    inner = turned(box(), np.ones(12, bool))
+    centre = inner.positions.mean(axis=0)
+    moved = (inner.positions - centre) * np.float32(size) + np.array(at, np.float32)
+    return joined(outer, Geometry(moved, inner.faces))
+
+
+def test_the_wall_of_a_cavity_looks_into_it_and_has_no_back() -> None:
+    solid = box()
+    middle = tuple(solid.positions.mean(axis=0))
+    hollow = surface(within(solid, 0.5, middle))  # type: ignore[arg-type]
+    assert not hollow.two_sided.any()
+    assert volume(hollow.points, hollow.faces) == pytest.approx(1 - 0.5**3)
+
+
+def test_an_inside_out_box_in_the_hole_of_a_ring_is_no_cavity() -> None:
+    whole = ring()
+    low, high = whole.bounds
+    made = surface(within(whole, 0.05 * float((high - low).min()), tuple((low + high) / 2)))
+    assert not made.two_sided[: len(whole.faces)].any()
+    assert made.two_sided[len(whole.faces) :].all()
+
+
 def test_a_moebius_strip_keeps_both_sides_and_its_winding() -> None:
     u = np.linspace(0, 2 * np.pi, 24, endpoint=False)
     half = np.stack([np.cos(u / 2) * np.cos(u), np.cos(u / 2) * np.sin(u), np.sin(u / 2)], axis=1)
