@@ -17,7 +17,8 @@ PANEL_WIDTH = 300
 class Theme:
     """Named colours.
 
-    `border` parts areas, `edge` shows where a control ends, `canvas` surrounds the picture.
+    `border` parts areas, `edge` shows where a control ends, `canvas` surrounds the picture; `mark` and `alarm`
+    lie over the picture, which is as bright in every theme.
     """
 
     name: str
@@ -33,6 +34,8 @@ class Theme:
     canvas: str
     warning: str
     problem: str
+    mark: str = "#f2a83b"
+    alarm: str = "#ff9a85"
 
 
 DARK = Theme(

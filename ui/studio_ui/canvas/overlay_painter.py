@@ -20,7 +20,7 @@ _FURTHEST = 1e5  # pixels beside the canvas: further is left out
 
 def colour(name: str, theme: Theme) -> QColor:
     """A colour of the overlay in a theme."""
-    named = {"accent": theme.accent, "problem": theme.problem, "line": LINE}
+    named = {"accent": theme.mark, "problem": theme.alarm, "line": LINE}
     return QColor(named.get(name, name))
 
 
@@ -72,9 +72,9 @@ def paint_message(painter: QPainter, size: QSizeF, text: str, theme: Theme) -> N
 def paint_badge(painter: QPainter, size: QSizeF, state: Freshness, theme: Theme) -> None:
     """A small mark in the lower right corner unless the picture is up to date."""
     colours = {
-        Freshness.STALE: theme.accent,
+        Freshness.STALE: theme.mark,
         Freshness.REFINING: "#8fb8d8",
-        Freshness.FAILED: theme.problem,
+        Freshness.FAILED: theme.alarm,
     }
     if state not in colours:
         return

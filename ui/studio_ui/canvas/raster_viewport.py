@@ -53,7 +53,7 @@ class RasterViewport(BaseViewport):
             mask = chosen[self._picture.node]
             if mask.any():
                 rim = self._rim(mask.shape[1])
-                self._outline = _image(outline(mask, rim), QColor(self._theme.accent))
+                self._outline = _image(outline(mask, rim), QColor(self._theme.mark))
         self.update()
 
     def paintEvent(self, event: QPaintEvent) -> None:

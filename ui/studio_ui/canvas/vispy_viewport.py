@@ -148,7 +148,7 @@ class VispyViewport(BaseViewport):
         smooth = 4 * width * height <= SMOOTH_SAMPLES
         if self._slow() and self.freshness not in _STILL:
             smooth = False
-        accent, ground = QColor(theme.accent), QColor(theme.canvas)
+        accent, ground = QColor(theme.mark), QColor(theme.canvas)
         look = Look(
             self.view.sized(width, height),
             2 if smooth else 1,
