@@ -21,6 +21,7 @@ from studio_core.scene.bounds import scene_bounds
 from studio_core.scene.nodes import Camera, Environment, Group, Material, MeshObject, Node, Scene, new_id
 from studio_core.scene.transform import Transform, axis_angle, vec3
 from studio_core.scripting import find as finding
+from studio_core.scripting.placing import Placing
 from studio_core.scripting.shown import help_text, overview
 from studio_core.session import Session, View
 from studio_core.shading.job import Job
@@ -32,7 +33,19 @@ Run = Callable[[str, Callable[[Job], Any]], Any]
 GROUPS: dict[str, tuple[str, ...]] = {
     "Look for things": ("find", "find_all", "material", "materials", "select", "selected", "size", "bounds"),
     "Change the scene": (
-        *("move", "turn", "copy", "change", "assign", "replace_material", "remove"),
+        *(
+            "move",
+            "turn",
+            "scale",
+            "drop",
+            "align",
+            "distribute",
+            "copy",
+            "change",
+            "assign",
+            "replace_material",
+            "remove",
+        ),
         *("add_model", "light_from", "apply", "undo", "redo"),
     ),
     "Look and render": ("look_through", "picture", "render"),
@@ -54,7 +67,7 @@ def at_once(label: str, work: Callable[[Job], T]) -> T:
     return work(Job(label))
 
 
-class Names:
+class Names(Placing):
     """Fills `namespace` and keeps its `scene` the current one until `close`.
 
     `services` is asked for when something is rendered; `run(label, work)` does what takes long and gives

@@ -51,7 +51,10 @@ CHECKS: dict[str, Callable[[Scene, Scene, str, Path], bool]] = {
     "A picture through every camera": lambda b, a, said, folder: len([*folder.glob("*.png")]) == 3,
     "The lamp on, the daylight off": lambda b, a, *_: next(a.of(Environment)).hidden,
     "How bright a picture is": lambda b, a, said, _: 0 < float(said.split()[1].rstrip(",")) < 5,
-    "Stand things on the floor": lambda b, a, *_: set(moved(b, a)) <= {"Sofa", "Armchair", "Coffee table"},
+    "Stand things on what lies below them": lambda b, a, *_: (
+        0 <= a.world("group-armchair").translation[1] < 0.05
+    ),
+    "Chairs in a row with equal gaps": lambda b, a, *_: len(made(b, a)) == 2,
     "A camera on a circle around a thing": lambda b, a, *_: len([*a.of(Camera)]) == len([*b.of(Camera)]) + 4,
     "Find what is below the floor": lambda b, a, said, _: said.strip() != "" and a is b,
     "Variants of one thing, side by side": lambda b, a, *_: len(a.materials) == len(b.materials) + 3,

@@ -17,8 +17,8 @@ PANEL_WIDTH = 300
 class Theme:
     """Named colours.
 
-    `border` parts areas, `edge` shows where a control ends, `canvas` surrounds the picture; `mark` and `alarm`
-    lie over the picture, which is as bright in every theme.
+    `border` parts areas, `edge` shows where a control ends, `canvas` surrounds the picture. Over the
+    picture, which no theme changes, lie `mark` and `alarm`.
     """
 
     name: str
