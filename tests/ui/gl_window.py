@@ -163,11 +163,12 @@ def hand(bench: Bench) -> dict[str, Any]:
     middle = QPoint(canvas.width() // 2, canvas.height() // 2)
     QTest.mouseClick(canvas, Qt.MouseButton.LeftButton, pos=middle)
     chosen = list(context.session.selection)
-    QTest.mousePress(canvas, Qt.MouseButton.LeftButton, pos=middle)
+    start = middle + QPoint(20, -5)  # beside the arrows
+    QTest.mousePress(canvas, Qt.MouseButton.LeftButton, pos=start)
     for step in (15, 30, 60):
-        QTest.mouseMove(canvas, middle + QPoint(step, 10))
+        QTest.mouseMove(canvas, start + QPoint(step, 10))
         QTest.qWait(20)
-    QTest.mouseRelease(canvas, Qt.MouseButton.LeftButton, pos=middle + QPoint(60, 10))
+    QTest.mouseRelease(canvas, Qt.MouseButton.LeftButton, pos=start + QPoint(60, 10))
     bench.wait(bench.settled)
     labels = [step.label for step in context.document.history]
     colours = canvas.tally.shapes
@@ -179,7 +180,7 @@ def hand(bench: Bench) -> dict[str, Any]:
     canvas.set_guides(View(Transform((0.0, 1.0, 4.0)), view.fov, view.width, view.height), ())
     turned = bench.grab()
     ahead = canvas.probe(0.5, 0.6)
-    canvas.set_guides(view, ())
+    bench.window.tools.refresh()  # guides and gizmo as they were
     moving = Move({"cube": Transform((-0.9, 0.5, 0.2))})
     canvas.set_scene(moving(context.document.scene))
     on_its_way, nowhere = bench.grab(), canvas.probe(0.5, 0.6)

@@ -24,6 +24,8 @@ ARM = 86.0
 """Logical pixels from the middle of a gizmo to the end of an arm."""
 REACH = 7.0
 """Logical pixels from which a handle is grabbed."""
+CLOSE = 4.0
+"""The same over the thing itself, which can be dragged as well."""
 COLOURS = ("#e5534b", "#7cb342", "#4c8dff")
 """Of x, y and z."""
 LIT, PLAIN = "#ffd54a", "#f2f2f0"
@@ -98,10 +100,10 @@ class Gizmo:
             return [*(Handle("ring", axis) for axis in range(3)), Handle("view_ring")]
         return [Handle("size"), *(Handle("size", arm.axis) for arm in arms)]
 
-    def pick(self, x: float, y: float) -> Handle | None:
+    def pick(self, x: float, y: float, reach: float = REACH) -> Handle | None:
         """The handle at a point of the canvas (0…1): the nearest within reach, else a plane under it."""
         at = np.array([x, y]) * self._size
-        best, found = REACH, None
+        best, found = reach, None
         for handle in self.handles():
             if handle.kind == "plane":
                 if found is None and _inside(self._on_canvas(self._square(handle.axis)), at):

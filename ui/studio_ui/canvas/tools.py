@@ -19,7 +19,7 @@ from studio_core.scene.room import Room
 from studio_core.session import Session
 from studio_core.signal import Signal
 from studio_ui.canvas.drags import Hold, LightDrag, Words, called
-from studio_ui.canvas.gizmos import Frame, Gizmo, Handle, meaning
+from studio_ui.canvas.gizmos import CLOSE, REACH, Frame, Gizmo, Handle, meaning
 from studio_ui.canvas.glyphs import glyphs
 from studio_ui.canvas.holding import AXES, Holding
 from studio_ui.canvas.looking import Looking
@@ -181,9 +181,16 @@ class CanvasTools:
 
     def _pressed(self, pointer: Pointer) -> None:
         self._press, self._mode = pointer, "click"
-        gizmo = self.gizmo()
         plain = pointer.button == "left" and not self._banding
-        self._lit = gizmo.pick(pointer.x, pointer.y) if gizmo is not None and plain else None
+        self._lit = self._handle_at(pointer) if plain else None
+
+    def _handle_at(self, pointer: Pointer) -> Handle | None:
+        gizmo = self.gizmo()
+        if gizmo is None:
+            return None
+        picked = self.pick(pointer)
+        held = picked is not None and is_held(self._document.scene, picked, self._session.selection)
+        return gizmo.pick(pointer.x, pointer.y, CLOSE if held else REACH)
 
     def _enter(self, pointer: Pointer) -> None:
         scene = self._document.scene
@@ -200,8 +207,7 @@ class CanvasTools:
 
     def _light(self, pointer: Pointer) -> None:
         """The handle under the mouse."""
-        gizmo = self.gizmo()
-        lit = gizmo.pick(pointer.x, pointer.y) if gizmo is not None else None
+        lit = self._handle_at(pointer)
         if lit != self._lit:
             self._lit = lit
             if lit is not None:
