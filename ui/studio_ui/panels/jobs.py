@@ -15,6 +15,7 @@ from studio_ui.tasks import Task
 
 _EVERY_MS, _IDLE_MS = 150, 1000
 _SURE = (0.03, 1.0)  # share and seconds from which on the rest is guessed
+_WORTH_TELLING = 1.0  # seconds
 SHOWN_FOR = 60.0  # seconds, of what is done
 _STATES = {"done": "done", "failed": "did not work: see Log", "cancelled": "cancelled"}
 
@@ -51,7 +52,7 @@ class JobRow(QWidget):
         elapsed = time.monotonic() - self.job.started
         told = words(elapsed)
         left = remaining(elapsed, done, total)
-        if left is not None:
+        if left is not None and left >= _WORTH_TELLING:
             told += f", about {words(left)} left"
         self.time.setText("Cancelling…" if self.job.cancelled else told)
 

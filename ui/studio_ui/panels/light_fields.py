@@ -46,9 +46,10 @@ class _SecondLine(NumberField):
 
     def __init__(self, name: str, info: ParamInfo, sink: Sink) -> None:
         super().__init__(name, info, sink)
-        self.hint = QLabel()
-        self.hint.setProperty("role", "dim")
-        self.hint.setWordWrap(True)
+        self.caption, self.hint = QLabel(), QLabel()
+        for label in (self.caption, self.hint):
+            label.setProperty("role", "dim")
+            label.setWordWrap(True)
         self.other = Spin(self.other_info, decimals=1)
         self.other.setFixedWidth(_WIDTH)
         self.other.setToolTip(self.other_info.doc)
@@ -60,9 +61,16 @@ class _SecondLine(NumberField):
         self._other_value = math.inf
         line = QHBoxLayout()
         line.setSpacing(GAP)
-        line.addWidget(self.hint, 1)
+        line.addWidget(self.caption, 1)
         line.addWidget(self.other, 0, Qt.AlignmentFlag.AlignTop)
         self.column.addLayout(line)
+        self.column.addWidget(self.hint)
+        self.hint.hide()
+
+    def tell(self, hint: str) -> None:
+        """A line below the numbers, or none."""
+        self.hint.setText(hint)
+        self.hint.setVisible(bool(hint))
 
     def to_other(self, value: float) -> float:
         """The number in the other unit."""
@@ -114,7 +122,7 @@ class LensField(_SecondLine):
 
     def __init__(self, name: str, info: ParamInfo, sink: Sink) -> None:
         super().__init__(name, info, sink)
-        self.hint.setText("As a full-frame lens")
+        self.caption.setText("Full-frame lens")
 
     def to_other(self, value: float) -> float:
         """Millimetres."""

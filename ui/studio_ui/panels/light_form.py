@@ -42,7 +42,7 @@ class NodeForm(ParamForm):
         if isinstance(intensity, IntensityField):
             lights = [node for node in nodes if isinstance(node, Light)]
             hints = {light_hint(light, calibration(list(scene.of(Environment)))) for light in lights}
-            intensity.hint.setText(hints.pop() if len(hints) == 1 else "")
+            intensity.tell(hints.pop() if len(hints) == 1 else "")
         if "projection" in self.fields:
             far = "projection" not in mixed and not str(values["projection"]).startswith("on")
             for name in _GROUND:

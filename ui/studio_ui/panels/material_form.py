@@ -22,6 +22,7 @@ from studio_ui.panels.texture_row import TextureRow
 from studio_ui.param_form import ParamForm, form_label, form_layout
 from studio_ui.sinks import EditSink
 from studio_ui.spin import MIXED
+from studio_ui.theme import GAP
 
 _COMMON: Mapping[str, ParamInfo] = param_infos(Material)
 PICTURES = "Pictures (*.png *.jpg *.jpeg *.exr *.hdr *.tif *.tiff)"
@@ -43,6 +44,7 @@ class MaterialForm(QWidget):
         self._built: object = self
         self._column = QVBoxLayout(self)
         self._column.setContentsMargins(0, 0, 0, 0)
+        self._column.setSpacing(GAP)
 
     def show_materials(self, chosen: tuple[MaterialId, ...]) -> None:
         """Those materials as they are now."""
@@ -55,6 +57,7 @@ class MaterialForm(QWidget):
         if key != self._built:
             self._built = key
             self._build(materials, model)
+            self._column.addStretch(1)
         if not materials:
             return
         last = materials[-1]

@@ -62,7 +62,8 @@ class MaterialsPanel(Panel):
         split.addWidget(top)
         split.addWidget(below)
         split.setSizes([240, 400])
-        split.setStretchFactor(1, 1)
+        for part, share in enumerate((2, 3)):
+            split.setStretchFactor(part, share)
         self.column.addWidget(split)
         self._soon = QTimer(self)
         self._soon.setSingleShot(True)

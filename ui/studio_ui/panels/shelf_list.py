@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from PySide6.QtCore import QPoint, QSignalBlocker, QSize, Qt
-from PySide6.QtGui import QColor, QIcon, QPainter, QPen, QPixmap
+from PySide6.QtGui import QColor, QIcon, QPainter, QPen, QPixmap, QResizeEvent
 from PySide6.QtWidgets import QListView, QListWidget, QListWidgetItem, QMenu
 
 from studio_ui.environment_shelf import Entry, EnvironmentShelf
@@ -11,6 +11,7 @@ from studio_ui.theme import DARK, Theme
 
 _ICON = QSize(108, 54)
 _GRID = QSize(118, 80)
+_MOST = 3  # rows before it scrolls
 _ROLE = Qt.ItemDataRole.UserRole
 
 
@@ -31,7 +32,7 @@ class ShelfList(QListWidget):
         self.setIconSize(_ICON)
         self.setGridSize(_GRID)
         self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
-        self.setFixedHeight(2 * _GRID.height() + 8)
+        self._fit()
         self.setContextMenuPolicy(Qt.ContextMenuPolicy.CustomContextMenu)
         self.customContextMenuRequested.connect(self._menu)
         self.itemClicked.connect(self._light)
@@ -56,7 +57,8 @@ class ShelfList(QListWidget):
         if shown == self._shown:
             return
         self._shown = shown
-        at = self.currentRow()
+        current_item = self.currentItem()
+        at = current_item.data(_ROLE).id if current_item is not None else None
         with QSignalBlocker(self):
             self.clear()
             for entry, _, current in shown:
@@ -69,8 +71,20 @@ class ShelfList(QListWidget):
                     font.setBold(True)
                     item.setFont(font)
                 self.addItem(item)
-            if at >= 0:
-                self.setCurrentRow(min(at, self.count() - 1))
+            ids = [entry.id for entry, _, _ in shown]
+            self.setCurrentRow(ids.index(at) if at in ids else -1)
+        self._fit()
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        """Another width: another number of columns."""
+        super().resizeEvent(event)
+        self._fit()
+
+    def _fit(self) -> None:
+        """As high as its rows, up to some."""
+        across = max(self.viewport().width() // _GRID.width(), 1)
+        rows = min(max(-(-self.count() // across), 1), _MOST)
+        self.setFixedHeight(rows * _GRID.height() + 8)
 
     def _tip(self, entry: Entry, current: bool) -> str:
         thumbnail = self._shelf.thumbnails.get(entry.id)
@@ -89,7 +103,7 @@ class ShelfList(QListWidget):
             painter.setRenderHint(QPainter.RenderHint.SmoothPixmapTransform)
             painter.drawImage(pixmap.rect(), thumbnail.image)
         else:
-            painter.fillRect(pixmap.rect(), QColor(self._theme.raised))
+            painter.fillRect(pixmap.rect(), QColor(self._theme.border))
         if current:
             painter.setPen(QPen(QColor(self._theme.accent), 4 * ratio))
             painter.drawRect(pixmap.rect())
