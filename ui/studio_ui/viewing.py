@@ -32,6 +32,7 @@ class Viewing:
         made: dict[str, Callable[[], object]] = {
             "view.frame_selection": self.frame_selection,
             "view.frame_all": self.frame_all,
+            "view.home": self.home,
             "view.brighter": lambda: self.expose(0.5),
             "view.darker": lambda: self.expose(-0.5),
             "view.invert_wheel": lambda: self.invert_wheel(not self._looking.inverted),

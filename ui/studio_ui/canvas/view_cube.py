@@ -53,6 +53,7 @@ class ViewCube(QWidget):
         self._sun: npt.NDArray[np.float64] | None = None
         self._theme = DARK
         self._press: QPointF | None = None
+        self._mouse: QPointF | None = None
         self._dragging = False
         self.setFixedSize(SIZE)
         self.setMouseTracking(True)
@@ -64,6 +65,8 @@ class ViewCube(QWidget):
         axes = axes_of(view)
         if not np.array_equal(axes, self._axes):
             self._axes = axes
+            if self._mouse is not None and not self._dragging:
+                self._hover(self.part_at(self._mouse))
             self.update()
 
     def set_sun(self, direction: npt.ArrayLike | None) -> None:
@@ -103,7 +106,7 @@ class ViewCube(QWidget):
 
     def mouseMoveEvent(self, event: QMouseEvent) -> None:
         """Light what lies under the mouse, or turn."""
-        at = event.position()
+        at = self._mouse = event.position()
         if self._press is None:
             self._hover(self.part_at(at))
             return
@@ -130,6 +133,7 @@ class ViewCube(QWidget):
 
     def leaveEvent(self, event: QEvent) -> None:
         """Nothing is under the mouse."""
+        self._mouse = None
         self._hover(None)
 
     def wheelEvent(self, event: QWheelEvent) -> None:
