@@ -158,3 +158,12 @@ def test_light_is_marked_where_it_comes_from(driver: Driver, cube: ViewCube) -> 
     sun = DirectionalLamp(id="sun", transform=Transform(rotation=axis_angle((1, 0, 0), -30)))
     driver.document.apply(Add((sun,)))
     assert cube._sun == pytest.approx((0, 0.5, np.sqrt(0.75)), abs=1e-6)
+
+
+def test_what_turns_under_a_mouse_at_rest_is_lit(driver: Driver, cube: ViewCube) -> None:
+    driver.window.viewing.home()
+    at = spot(cube, (1, 0, 0))
+    driver.bot.mouseMove(cube, at)
+    driver.do("view.front")
+    assert cube.hovered == cube.part_at(QPointF(at))
+    assert cube.hovered != (1, 0, 0)
