@@ -29,8 +29,9 @@ from studio_core.session import View
 from studio_core.shading.job import Job
 from studio_core.shading.scheduler import InlineExecutor
 from studio_ui.pictures.child import run_program
+from studio_ui.pictures.copy import framed
 from studio_ui.pictures.dialog import PictureDialog
-from studio_ui.pictures.export_dialog import ExportDialog, framed
+from studio_ui.pictures.export_dialog import ExportDialog
 from studio_ui.pictures.order import (
     HERE,
     KINDS,
@@ -77,7 +78,7 @@ class Child:
         if self.fail is not None:
             raise self.fail
         options.out.write_bytes(b"a picture")
-        return RESULT
+        return RESULT if options.verb == "render" else {**RESULT, "seconds": 10.0}
 
 
 @pytest.fixture
@@ -129,7 +130,7 @@ def test_a_picture_is_ordered_with_what_the_window_shows(out: tuple[Driver, Chil
     assert options.out == tmp_path / "Room.png"
     (camera,) = (one for one in stand_in.cameras if one.id == options.camera)
     assert camera.transform == driver.session.view.transform
-    assert camera.fov == driver.session.view.fov
+    assert camera.fov == driver.window.cameras.shot(3840, 2160).fov
     assert len(list(driver.document.scene.of(Camera))) == 2  # the document is as it was
     assert not driver.document.modified or driver.labels()[-1] != "Picture"
     assert "Exported Room.png, 64 × 36 pixels" in dialog.told.text()
@@ -149,7 +150,8 @@ def test_a_camera_layers_and_bits_are_ordered(out: tuple[Driver, Child], tmp_pat
     dialog.measure.setChecked(True)
     export(driver, dialog)
     options = options_of(stand_in)
-    assert options.camera == "right"
+    (camera,) = (one for one in stand_in.cameras if one.id == options.camera)
+    assert (camera.name, camera.transform) == ("Right", driver.document.scene["right"].transform)
     assert options.out == tmp_path / "Room.exr"
     assert (options.bits, options.lights, options.alpha, options.measure) == (16, True, True, 256)
 
@@ -260,7 +262,22 @@ def test_the_preview_has_the_shape_of_the_picture() -> None:
     assert (wide.width(), wide.height()) == (180, 60)
     assert wide.pixelColor(90, 30).lightness() == 255
     assert wide.pixelColor(10, 30).lightness() == wide.pixelColor(170, 30).lightness() == 34
-    assert framed(QImage(), 2.0).isNull()
+    part = framed(image, 1.0, 0.5)
+    assert (part.width(), part.height()) == (30, 30)
+    assert part.pixelColor(0, 0).lightness() == 255
+
+
+def test_what_a_camera_frames_is_what_is_exported(out: tuple[Driver, Child]) -> None:
+    driver, stand_in = out
+    driver.window.cameras.use_frame("16:9")
+    driver.window.cameras.look("left")
+    driver.settle()
+    dialog = dialog_of(driver, "file.export_picture")
+    size = dialog.size_form.size_()
+    assert size.width / size.height == pytest.approx(16 / 9, rel=0.01)
+    export(driver, dialog)
+    (camera,) = (one for one in stand_in.cameras if one.id == options_of(stand_in).camera)
+    assert (camera.name, camera.fov) == ("Left", pytest.approx(driver.document.scene["left"].fov, abs=0.5))
 
 
 # --- series -------------------------------------------------------------------------------------------
@@ -297,7 +314,9 @@ def test_light_goes_around_and_paths_lead_through_ticked_cameras(out: tuple[Driv
     dialog.closed.setChecked(True)
     export(driver, dialog)
     options = options_of(stand_in)
-    assert (options.path, options.frames) == ("left,right", 48)
+    names = {camera.id: camera.name for camera in stand_in.cameras}
+    assert [names[camera] for camera in options.path.split(",")] == ["Left", "Right"]
+    assert options.frames == 48
     assert (options.closed, options.ease, options.uneven) == (True, True, True)
     dialog.path_list.item(0).setCheckState(Qt.CheckState.Unchecked)
     assert not dialog.export_button.isEnabled()
@@ -348,11 +367,11 @@ def test_every_order_is_one_the_command_line_takes(kind: Any, tmp_path: Path) ->
 
 def test_guesses_grow_with_the_picture() -> None:
     small, large = (Look(Size(side, side)) for side in (1000, 4000))
-    past = learned(small, {"seconds": {"shading": 10.0, "composing": 1.0}}, {})
+    past = learned(small, {"shading": 10.0, "composing": 1.0}, {})
     assert guessed(small, past) == pytest.approx(14)
     assert guessed(large, past) > 3 + 16 + 10
     assert guessed(Look(Size(10, 10), quality="final"), past) is None
-    assert guessed(small, {"screen": {"shading": "?"}}) is None
+    assert guessed(small, {"one screen": {"shading": "?"}}) is None
     assert [duration(s) for s in (0.2, 80, 100, 8000)] == ["1 s", "80 s", "2 min", "2 h 13 min"]
 
 
@@ -365,7 +384,9 @@ def test_a_picture_made_by_the_child_is_there(tmp_path: Path) -> None:
     lines: list[bytes] = []
     view, job = View(looking((2.5, 1.8, 3.2), (0, 0.4, 0))), Job("Exporting")
     order = PictureOrder(HERE, tmp_path / "a.png", SMALL)
-    result = make_pictures(order, little_scene(), view, "A: room", run_program, job, lines.append)
+    result = make_pictures(
+        order, little_scene(), {HERE: ("View", view)}, "A: room", run_program, job, lines.append
+    )
     assert result["finite"]
     assert read_image(tmp_path / "a.png").pixels.shape == (18, 32, 3)
     assert QImage.fromData(lines[-1]).width() == 32
@@ -391,7 +412,7 @@ def test_a_cancelled_child_leaves_nothing(tmp_path: Path) -> None:
 
     series = SeriesOrder("turntable", (HERE,), tmp_path / "t.png", SMALL, 5000)
     with pytest.raises(Cancelled):
-        make_pictures(series, little_scene(), View(), "A", run, job, lambda _: None)
+        make_pictures(series, little_scene(), {HERE: ("View", View())}, "A", run, job, lambda _: None)
     assert all(path.name.startswith("t_") for path in tmp_path.iterdir())
 
 
@@ -401,7 +422,9 @@ def test_a_child_that_dies_is_told_of(monkeypatch: pytest.MonkeyPatch, tmp_path:
     monkeypatch.setattr(child, "PROGRAM", (sys.executable, "-c", script, str(left)))
     order = PictureOrder(HERE, tmp_path / "a.png", SMALL)
     with pytest.raises(LucarneError, match="ended"):
-        make_pictures(order, little_scene(), View(), "A", run_program, Job("a"), lambda _: None)
+        make_pictures(
+            order, little_scene(), {HERE: ("View", View())}, "A", run_program, Job("a"), lambda _: None
+        )
     assert not list(tmp_path.iterdir())
 
 

@@ -141,13 +141,13 @@ class MainWindow(QMainWindow):
         self.commands = Commands(context, self.tools)
         self.viewing = Viewing(context, self.tools.looking, settings)
         self.cameras = Cameras(context, self.tools.looking, settings)
+        self.pictures = PictureOut(
+            self, context, self.ask, settings, self.cameras, lambda: self.files.name, self.files.beside
+        )
         self.camera_pictures = CameraPictures(context, self.cameras, settings.folder / "cameras")
         self.aids = ViewAids(context, viewport, self.tools.looking, self.viewing, self.cameras, settings)
         self.transfer = Transfer(context, self.ask, self.files.beside)
         self.importing = Importing(context, self.ask, settings, self.viewing.frame_all)
-        self.pictures = PictureOut(
-            self, context, self.ask, settings, lambda: self.files.name, self.files.beside
-        )
         self.canvas = CanvasChoice(viewport, settings, context.journal.write)
         self.appearance = Appearance(self.preferences, viewport, self.canvas)
         self.layout_ = Layout(self, settings, self._panels())

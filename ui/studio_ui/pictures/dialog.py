@@ -13,6 +13,7 @@ from PySide6.QtWidgets import (
     QLabel,
     QProgressBar,
     QPushButton,
+    QScrollArea,
     QSizePolicy,
     QVBoxLayout,
     QWidget,
@@ -25,7 +26,7 @@ from studio_ui.tasks import Task
 from studio_ui.theme import GAP
 
 _EVERY_MS = 200
-FORM_WIDTH = 380
+FORM_WIDTH, SCROLL_BAR = 380, 12
 
 
 class Orders(Protocol):
@@ -108,9 +109,8 @@ class PictureDialog(QDialog):
 
     def _layout(self) -> None:
         self.form = QWidget()
-        self.form.setFixedWidth(FORM_WIDTH)
         self.form.setLayout(self.form_column)
-        self.form_column.setContentsMargins(0, 0, 0, 0)
+        self.form_column.setContentsMargins(0, 0, SCROLL_BAR, 0)
         right = QVBoxLayout()
         right.setSpacing(GAP)
         right.addWidget(self.preview, 1)
@@ -118,10 +118,12 @@ class PictureDialog(QDialog):
         right.addWidget(self.told)
         halves = QHBoxLayout()
         halves.setSpacing(3 * GAP)
-        left = QVBoxLayout()
-        left.addWidget(self.form)
-        left.addStretch(1)
-        halves.addLayout(left)
+        area = QScrollArea()
+        area.setWidgetResizable(True)
+        area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        area.setWidget(self.form)
+        area.setFixedWidth(FORM_WIDTH + SCROLL_BAR)
+        halves.addWidget(area)
         halves.addLayout(right, 1)
         buttons = QHBoxLayout()
         buttons.addWidget(self.folder_button)

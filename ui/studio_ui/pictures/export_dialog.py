@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from PySide6.QtGui import QColor, QImage, QPainter
+from PySide6.QtGui import QImage
 from PySide6.QtWidgets import QCheckBox, QLineEdit, QToolButton, QWidget
 
 from studio_core.scene.nodes import Camera
@@ -20,7 +20,6 @@ from studio_ui.pictures.work import unused
 if TYPE_CHECKING:
     from studio_ui.pictures.feature import PictureOut
 
-SHEET_GROUND = 34  # grey of what is not known yet
 FILTERS = (Filter("PNG picture, as shown", (".png",)), Filter("OpenEXR, linear light", (".exr",)))
 
 
@@ -58,10 +57,11 @@ class ExportDialog(PictureDialog):
         self.path.setAccessibleName("Save as")
         for part in (top, self.size_form, self.look_form, bottom):
             self.form_column.addWidget(part)
+        self.form_column.addStretch(1)
+        self.resize(940, 560)
         self.browse.clicked.connect(self._browse)
         self.size_form.changed.connect(self._changed)
         self.look_form.changed.connect(self._changed)
-        self._shown = owner.shown_image()
         self.camera.currentIndexChanged.connect(self._changed)
         self._changed()
 
@@ -107,25 +107,7 @@ class ExportDialog(PictureDialog):
         if path.suffix.lower() in (".png", ".exr") and path.suffix.lower() != suffix:
             self.path.setText(str(path.with_suffix(suffix)))
         if self.task is None:
-            here, size = self.camera.currentData() == HERE, self.size_form.size_()
-            image = framed(self._shown, size.width / size.height) if here else QImage()
+            here = self.camera.currentData() == HERE
+            image = self._owner.framed(self.size_form.size_()) if here else QImage()
             self.preview.show_image(image, "" if here else "The preview comes with the picture.")
             self.tell(self.estimate())
-
-
-def framed(image: QImage, shape: float) -> QImage:
-    """What a picture of that shape (width over height) will show of what is shown: all that is as high.
-
-    Where it is wider than the window nothing is known of the sides.
-    """
-    if image.isNull():
-        return image
-    width = round(image.height() * shape)
-    if width <= image.width():
-        return image.copy((image.width() - width) // 2, 0, max(width, 1), image.height())
-    made = QImage(width, image.height(), QImage.Format.Format_RGB888)
-    made.fill(QColor(SHEET_GROUND, SHEET_GROUND, SHEET_GROUND))
-    painter = QPainter(made)
-    painter.drawImage((width - image.width()) // 2, 0, image)
-    painter.end()
-    return made

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -13,13 +14,17 @@ from PySide6.QtWidgets import QWidget
 from studio_core.arrays import frozen_map
 from studio_core.errors import PluginError
 from studio_core.params import param_infos
+from studio_core.scene.nodes import Camera
+from studio_core.session import View
 from studio_core.shading.job import Job
 from studio_core.shading.scheduler import ComputeThread, Executor
 from studio_ui.ask import Ask
+from studio_ui.cameras import Cameras
+from studio_ui.canvas.framing import frame_in
 from studio_ui.context import Context
 from studio_ui.feed import Freshness
 from studio_ui.pictures.child import Runner, run_program
-from studio_ui.pictures.copy import shown_image
+from studio_ui.pictures.copy import framed, shown_image
 from studio_ui.pictures.dialog import PictureDialog
 from studio_ui.pictures.export_dialog import ExportDialog
 from studio_ui.pictures.forms import LookForm, SizeForm
@@ -46,13 +51,14 @@ class PictureOut:
         context: Context,
         ask: Ask,
         settings: Settings,
+        cameras: Cameras,
         name: Callable[[], str],
         beside: Callable[[str], Path],
     ) -> None:
         self.context, self.ask, self.memory = context, ask, PictureMemory(settings)
         self.runner: Runner = run_program
         self.executor: Executor | None = None  # a thread of its own from the first picture on
-        self._parent, self._name, self._beside = parent, name, beside
+        self._parent, self._cameras, self._name, self._beside = parent, cameras, name, beside
         self._relay = _Relay(parent)
         self._relay.arrived.connect(self._arrived)
         self._dialogs: dict[int, PictureDialog] = {}
@@ -83,13 +89,37 @@ class PictureOut:
     # what dialogs ask
 
     def window_size(self) -> Size:
-        """Of the canvas."""
-        return Size(*self.context.feed.size)
+        """Of the canvas, or of the frame in it while a camera is looked through."""
+        width, height = self.context.feed.size
+        if self._cameras.camera() is not None:
+            _, _, width, height = (round(side) for side in frame_in(self._cameras.aspect, width, height))
+        return Size(max(width, 1), max(height, 1))
+
+    def seen(self, camera: str, size: Size) -> tuple[str, View]:
+        """Name of a camera (or `HERE`), and what a picture of it shows."""
+        node = self.context.document.scene.nodes.get(camera)
+        if isinstance(node, Camera):
+            return node.name, self._cameras.seen(node, (size.width, size.height))
+        through = self._cameras.camera()
+        return "View" if through is None else through.name, self._cameras.shot(size.width, size.height)
+
+    def framed(self, size: Size) -> QImage:
+        """What of the window's picture a picture of that size will show."""
+        shown, image = self.context.feed.last, self.shown_image()
+        if shown is None or image.isNull():
+            return image
+        angles = (self._cameras.shot(size.width, size.height).fov, shown.view.fov)
+        wanted, there = (math.tan(math.radians(angle) / 2) for angle in angles)
+        return framed(image, size.width / size.height, wanted / there)
 
     def shown_image(self) -> QImage:
         """What the window shows."""
         shown, session = self.context.feed.last, self.context.session
         return QImage() if shown is None else shown_image(shown, session.exposure, session.tonemap)
+
+    def beside(self, suffix: str) -> Path:
+        """Where files of that suffix are suggested to be put."""
+        return self._beside(suffix)
 
     def free_path(self, suffix: str) -> Path:
         """A name beside the project that no file has yet."""
@@ -127,13 +157,14 @@ class PictureOut:
     def start(self, order: Order, dialog: PictureDialog) -> Task:
         """Have it made after what is waiting already; the dialog is told how it goes, while it is open."""
         number = next((n for n, known in self._dialogs.items() if known is dialog), 0)
-        scene, view, name = self.context.document.scene, self.context.session.view, self._name()
+        scene, name, size = self.context.document.scene, self._name(), order.look.size
+        views = {camera: self.seen(camera, size) for camera in order.cameras}
 
         def work(job: Job) -> dict[str, Any]:
             def seen(png: bytes) -> None:
                 self._relay.arrived.emit(number, png)
 
-            made: dict[str, Any] = make(order, scene, view, name, self.runner, job, seen)
+            made: dict[str, Any] = make(order, scene, views, name, self.runner, job, seen)
             return made
 
         def done(result: dict[str, Any]) -> None:
@@ -158,12 +189,15 @@ class PictureOut:
         taken = duration(task.seconds)
         finite = "" if result["finite"] else " Some pixels are no numbers."
         if isinstance(order, PictureOrder):
-            self.memory.took(order.look, result)
+            self.memory.took(order.look, result["seconds"])
             error = result.get("error")
             told = f", error {100 * error['picture']['relative_rmse']:.1f} %" if error else ""
             return f"Exported {order.path.name}, {size}{told}, in {taken}.{finite}"
         kept = f", {result['kept']} of them were there" if result["kept"] else ""
         count = len(result["frames"])
+        if count > result["kept"]:
+            each = {"shading": result["seconds"] / (count - result["kept"]), "composing": 0.0}
+            self.memory.took(order.look, each, "each")
         return f"Exported {count} pictures to {order.path.parent.name}, {size}{kept}, in {taken}.{finite}"
 
     def _arrived(self, number: int, png: bytes) -> None:

@@ -14,8 +14,9 @@ from studio_ui.pictures.order import KINDS, MOST_PIXELS, PRESETS, QUALITIES, SAM
 from studio_ui.spin import Spin
 from studio_ui.theme import GAP
 
-LABELS, FIELDS = 104, 26  # pixels: width of labels, height of fields
 _WINDOW, _CUSTOM = "As the window", "Other"
+
+LABELS, FIELDS = 108, 26  # pixels: width of labels, height of fields
 
 
 def labelled(form: QFormLayout, text: str, field: QWidget, tip: str = "") -> None:
@@ -28,11 +29,11 @@ def labelled(form: QFormLayout, text: str, field: QWidget, tip: str = "") -> Non
     form.addRow(label, field)
 
 
-def named(text: str) -> QLabel:
+def named(text: str, height: int = FIELDS) -> QLabel:
     """A label as wide as those of the forms above and below, at the height of its field."""
     label = QLabel(text)
     label.setFixedWidth(LABELS)
-    label.setMinimumHeight(FIELDS)
+    label.setMinimumHeight(height)
     return label
 
 
@@ -78,8 +79,8 @@ class SizeForm(QWidget):
         checks.addWidget(self.linked)
         checks.addWidget(self.upright)
         checks.addStretch(1)
-        form.addRow(named(""), checks)
-        form.addRow(named(""), self.told)
+        form.addRow(named("", 0), checks)
+        form.addRow(named("", 0), self.told)
         self.preset.currentIndexChanged.connect(self._chosen)
         self.width_.valueChanged.connect(lambda value: self._typed(self.width_, self.height_, value))
         self.height_.valueChanged.connect(lambda value: self._typed(self.height_, self.width_, value))

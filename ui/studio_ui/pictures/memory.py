@@ -24,9 +24,9 @@ class PictureMemory:
         found: dict[str, Any] = self._settings.get(_PAST, {})
         return found
 
-    def took(self, look: Look, result: Mapping[str, Any]) -> None:
-        """A picture was made."""
-        self._settings.set(_PAST, learned(look, result, self.past))
+    def took(self, look: Look, seconds: Mapping[str, float], kind: str = "one") -> None:
+        """A picture, or one of many, took so long for shading and composing."""
+        self._settings.set(_PAST, learned(look, seconds, self.past, kind))
 
     def size(self) -> Size | None:
         """The last size; None: there is none."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -119,6 +120,15 @@ class PictureOrder:
     path: Path
     look: Look
 
+    @property
+    def cameras(self) -> tuple[str, ...]:
+        """The camera."""
+        return (self.camera,)
+
+    def seen_by(self, others: Mapping[str, str]) -> PictureOrder:
+        """The same of another camera."""
+        return dataclasses.replace(self, camera=others[self.camera])
+
     def arguments(self, project: Path, preview: Path) -> list[str]:
         """For the command line, of a project that has the camera."""
         made = ["render", str(project), "-o", str(self.path), "--camera", self.camera]
@@ -140,6 +150,10 @@ class SeriesOrder:
     ease: bool = True
     even: bool = True
     resume: bool = False
+
+    def seen_by(self, others: Mapping[str, str]) -> SeriesOrder:
+        """The same of other cameras."""
+        return dataclasses.replace(self, cameras=tuple(others[camera] for camera in self.cameras))
 
     def arguments(self, project: Path, preview: Path) -> list[str]:
         """For the command line, of a project that has the cameras."""
@@ -166,9 +180,9 @@ def _text(value: object) -> str:
     return str(value).lower() if isinstance(value, bool) else str(value)
 
 
-def guessed(look: Look, past: Mapping[str, Any]) -> float | None:
+def guessed(look: Look, past: Mapping[str, Any], kind: str = "one") -> float | None:
     """Seconds that a picture will take, by the last one of its quality (`learned`); None: who knows."""
-    found = past.get(look.quality)
+    found = past.get(f"{kind} {look.quality}")
     if not isinstance(found, dict):
         return None
     try:
@@ -179,11 +193,11 @@ def guessed(look: Look, past: Mapping[str, Any]) -> float | None:
         return None
 
 
-def learned(look: Look, result: Mapping[str, Any], past: Mapping[str, Any]) -> dict[str, Any]:
-    """What is remembered of a picture that was made: `past` with its seconds."""
-    seconds, samples = result["seconds"], _samples(look)
+def learned(look: Look, seconds: Mapping[str, float], past: Mapping[str, Any], kind: str = "one") -> Any:
+    """What is remembered of a picture, or of one of many: `past` with its seconds for both halves."""
+    samples = _samples(look)
     facts = {"samples": samples, "guide": min(samples, GUIDE_SAMPLES)}
-    return {**past, look.quality: {**seconds, **facts}}
+    return {**past, f"{kind} {look.quality}": {**seconds, **facts}}
 
 
 def _samples(look: Look) -> int:

@@ -6,14 +6,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from PySide6.QtCore import Qt
-from PySide6.QtGui import QImage
 from PySide6.QtWidgets import (
     QAbstractItemView,
     QCheckBox,
     QLineEdit,
     QListWidget,
     QListWidgetItem,
-    QStackedWidget,
     QToolButton,
     QWidget,
 )
@@ -27,6 +25,7 @@ from studio_ui.panels.panel import note, row
 from studio_ui.pictures.dialog import PictureDialog
 from studio_ui.pictures.forms import LookForm, SizeForm, form_in, labelled, named
 from studio_ui.pictures.order import HERE, SeriesOrder, duration, guessed
+from studio_ui.pictures.work import unused
 from studio_ui.spin import Spin
 
 if TYPE_CHECKING:
@@ -72,12 +71,11 @@ class SeriesDialog(PictureDialog):
         self.even.setChecked(True)
         self.size_form = SizeForm(owner.window_size(), memory.size())
         self.look_form = LookForm(*memory.look())
-        start = owner.free_path(self.look_form.kind_().suffix)
-        self.folder = QLineEdit(str(start.parent / f"{start.stem} frames"))
-        self.name = QLineEdit(start.stem)
+        start = owner.beside("")
+        self.folder = QLineEdit(str(unused(start.with_name(f"{start.name} frames"))))
+        self.name = QLineEdit(start.name)
         self.resume = QCheckBox("Keep pictures that are there")
         self.resume.setToolTip("To go on after an interruption; they should show the same scene")
-        self.preview.show_image(QImage(), "Small pictures appear here while they are made.")
         self._put_together()
         self._times()
         self._changed()
@@ -91,9 +89,8 @@ class SeriesDialog(PictureDialog):
         labelled(walking, "Cameras", self.path_list, "Those with a tick, from the top down; drag to reorder")
         for check in (self.closed, self.ease, self.even):
             walking.addRow(named(""), check)
-        self.pages = QStackedWidget()
-        self.pages.addWidget(turn)
-        self.pages.addWidget(path)
+        self.pages = (turn, path)
+        path.hide()
         top, times, files = QWidget(), QWidget(), QWidget()
         labelled(form_in(top), "Kind", self.kind, "What moves")
         timing = form_in(times)
@@ -114,8 +111,10 @@ class SeriesDialog(PictureDialog):
         labelled(below, "Name", self.name, "What the files begin with")
         below.addRow(named(""), self.files_told)
         below.addRow(named(""), self.resume)
-        for part in (top, self.pages, times, self.size_form, self.look_form, files):
+        for part in (top, *self.pages, times, self.size_form, self.look_form, files):
             self.form_column.addWidget(part)
+        self.form_column.addStretch(1)
+        self.resize(980, 720)
         self.kind.currentIndexChanged.connect(self._kind)
         self.count.valueChanged.connect(lambda _: self._times())
         self.rate.valueChanged.connect(lambda _: self._times())
@@ -153,10 +152,14 @@ class SeriesDialog(PictureDialog):
 
     def estimate(self) -> str:
         """By the last picture of that quality."""
-        seconds = guessed(self._owner.look(self.size_form, self.look_form), self._owner.memory.past)
-        if seconds is None:
+        look, past = self._owner.look(self.size_form, self.look_form), self._owner.memory.past
+        each = guessed(look, past, "each")
+        if each is not None:
+            return f"About {duration(each * self._count())}, judging by the last ones."
+        one = guessed(look, past)
+        if one is None:
             return "How long it takes is known after the first one."
-        return f"About {duration(seconds * self._count())} or less, judging by the last picture."
+        return f"Less than {duration(one * self._count())}, judging by the last picture."
 
     def _count(self) -> int:
         return round(self.count.value())
@@ -177,7 +180,8 @@ class SeriesDialog(PictureDialog):
 
     def _kind(self) -> None:
         kind = self.kind.currentData()
-        self.pages.setCurrentIndex(1 if kind == "path" else 0)
+        self.pages[0].setVisible(kind != "path")
+        self.pages[1].setVisible(kind == "path")
         self.around.setEnabled(kind == "turntable")
         self._changed()
 
@@ -201,6 +205,8 @@ class SeriesDialog(PictureDialog):
         )
         few = self.kind.currentData() == "path" and len(self._cameras()) < 2
         self.export_button.setEnabled(not few)
+        if self.camera.currentData() == HERE:
+            self.preview.show_image(self._owner.framed(self.size_form.size_()))
         text = "A path needs two cameras or more: View ▸ New camera from view." if few else self.estimate()
         self.tell(text, "warning" if few else "dim")
 

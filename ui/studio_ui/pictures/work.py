@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import contextlib
-import dataclasses
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -21,21 +20,28 @@ Seen = Callable[[bytes], object]
 """Gets a small picture of what there is so far, as a PNG."""
 
 
-def make(order: Order, scene: Scene, view: View, name: str, runner: Runner, job: Job, seen: Seen) -> Any:
-    """Have it made; the result of the command. `view` is what the window shows."""
-    camera = Camera(
-        id=new_id("camera"), name="View", transform=view.transform, fov=view.fov, focus=view.focus
-    )
+def make(
+    order: Order,
+    scene: Scene,
+    views: Mapping[str, tuple[str, View]],
+    name: str,
+    runner: Runner,
+    job: Job,
+    seen: Seen,
+) -> Any:
+    """Have it made; the result of the command. `views`: name and view of each camera that the order names."""
+    cameras = {known: _camera(*views[known]) for known in order.cameras}
     started = time.time()
     try:
         with tempfile.TemporaryDirectory(prefix="lucarne-picture-") as folder:
             from studio_core.project.store import save
 
             project, preview = Path(folder) / f"{_plain(name)}.lucarne", Path(folder) / "preview.png"
-            save(project, scene.with_nodes(camera), label="Picture", fresh=True)
+            save(project, scene.with_nodes(*cameras.values()), label="Picture", fresh=True)
             job.checkpoint()
             look = _Look(preview, seen)
-            made = runner(_at(order, camera.id).arguments(project, preview), job, lambda _: look())
+            asked = order.seen_by({known: camera.id for known, camera in cameras.items()})
+            made = runner(asked.arguments(project, preview), job, lambda _: look())
             look()
             return made
     except BaseException:
@@ -57,11 +63,8 @@ class _Look:
                 self._seen(self._path.read_bytes())
 
 
-def _at(order: Order, camera: str) -> Order:
-    """The order with a camera in the place of what the window shows."""
-    if isinstance(order, PictureOrder):
-        return dataclasses.replace(order, camera=order.camera or camera)
-    return dataclasses.replace(order, cameras=tuple(one or camera for one in order.cameras))
+def _camera(name: str, view: View) -> Camera:
+    return Camera(id=new_id("camera"), name=name, transform=view.transform, fov=view.fov, focus=view.focus)
 
 
 def unused(path: Path) -> Path:
