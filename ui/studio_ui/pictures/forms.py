@@ -91,6 +91,11 @@ class SizeForm(QWidget):
         """What is meant."""
         return Size(round(self.width_.value()), round(self.height_.value()), self._dpi)
 
+    @property
+    def as_window(self) -> bool:
+        """Whether that is the window's size."""
+        return self.preset.currentIndex() == 0
+
     def show_size(self, size: Size) -> None:
         """Without telling."""
         self._dpi = size.dpi

@@ -53,6 +53,7 @@ class PictureMemory:
         """What was chosen."""
         meant = size.size_()
         chosen = {"width": meant.width, "height": meant.height, "dpi": meant.dpi}
+        chosen = dict.fromkeys(chosen, 0) if size.as_window else chosen  # it may be another one
         look_ = {"quality": look.quality.currentData(), "samples": look.samples.currentData()}
         kind = {"kind": look.kind.currentIndex()}
         self._settings.set(_CHOICES, {**self._choices(), **chosen, **look_, **kind, **more})
