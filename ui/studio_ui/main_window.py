@@ -225,7 +225,7 @@ class MainWindow(QMainWindow):
         self.preferences_.dress_numbers()
 
     def _opened(self) -> None:
-        self.tools.entered = None
+        self.tools.selecting.entered = None
         self.cameras.adopt()
 
     def take_files(self, paths: list[Path]) -> None:

@@ -12,7 +12,7 @@ from collections.abc import Callable
 import numpy as np
 
 from studio_core.document import Document
-from studio_core.scene.arranging import is_locked, roots
+from studio_core.scene.arranging import roots
 from studio_core.scene.diff import Changes
 from studio_core.scene.nodes import Environment, NodeId, Scene
 from studio_core.scene.room import Room
@@ -24,8 +24,8 @@ from studio_ui.canvas.glyphs import glyphs
 from studio_ui.canvas.holding import AXES, Holding
 from studio_ui.canvas.looking import Looking
 from studio_ui.canvas.overlay import Band, Overlay
-from studio_ui.canvas.picking import caught, is_held, joined, owner
 from studio_ui.canvas.projection import bounds, box_segments
+from studio_ui.canvas.selecting import Selecting
 from studio_ui.canvas.viewport import Pointer, Viewport
 from studio_ui.editing import Editing
 from studio_ui.feed import PictureFeed
@@ -51,9 +51,9 @@ class CanvasTools:
     ) -> None:
         self.tool = "move"
         self.tool_changed: Signal[[str]] = Signal()
-        self.entered: NodeId | None = None  # the group whose parts are chosen
         self.looking = Looking(viewport, document, session, feed)
         self.holding = Holding(editing, session, hint)
+        self.selecting = Selecting(viewport, document, session, hint)
         self._viewport, self._document, self._session = viewport, document, session
         self._editing, self._magnet, self._hint = editing, magnet, hint
         self._press: Pointer | None = None
@@ -107,16 +107,6 @@ class CanvasTools:
             boxes = box_segments(*found)
         self._viewport.set_guides(view, glyphs(scene, view, chosen), boxes, self._overlay())
 
-    def pick(self, pointer: Pointer, deep: bool = False) -> NodeId | None:
-        """What a click there means: the topmost group of what is seen, or a part of the entered one."""
-        scene = self._document.scene
-        glyph = self._viewport.glyph_at(pointer.x, pointer.y)
-        probe = self._viewport.probe(pointer.x, pointer.y)
-        node = glyph if glyph is not None else probe.node if probe is not None else None
-        if node is None or node not in scene.nodes or is_locked(scene, node):
-            return None
-        return node if deep else owner(scene, node, self.entered)
-
     def gizmo(self) -> Gizmo | None:
         """The handles of the tool in use, on what is chosen."""
         frame = self.holding.frame or self._frame()
@@ -145,9 +135,7 @@ class CanvasTools:
             self._mode, self._banding = "", False
             self.refresh()
             return True
-        if self.entered is not None:
-            entered, self.entered = self.entered, None
-            self._session.select([entered] if entered in self._document.scene.nodes else [])
+        if self.selecting.leave():
             return True
         self._session.select([])
         return False
@@ -162,8 +150,8 @@ class CanvasTools:
             self._pressed(pointer)
         elif pointer.kind == "double":
             self._pressed(pointer)
-            if self._lit is None:
-                self._enter(pointer)
+            if self._lit is None and self.selecting.enter(pointer):
+                self._mode = ""
         elif pointer.kind == "move" and self._press is not None:
             self._moved(pointer)
         elif pointer.kind == "move":
@@ -188,22 +176,8 @@ class CanvasTools:
         gizmo = self.gizmo()
         if gizmo is None:
             return None
-        picked = self.pick(pointer)
-        held = picked is not None and is_held(self._document.scene, picked, self._session.selection)
-        return gizmo.pick(pointer.x, pointer.y, CLOSE if held else REACH)
-
-    def _enter(self, pointer: Pointer) -> None:
-        scene = self._document.scene
-        node = self.pick(pointer, deep=True)
-        if node is None:
-            return
-        above = [n.id for n in scene.ancestors(node)]
-        inside = above.index(self.entered) if self.entered in above else len(above)
-        self.entered = above[inside - 1] if inside > 0 and above else None
-        self._session.select([owner(scene, node, self.entered)])
-        self._mode = ""
-        if self.entered is not None:
-            self._hint(f"Parts of {scene[self.entered].name} can be chosen; Esc leaves it")
+        over = self.selecting.held(pointer) is not None
+        return gizmo.pick(pointer.x, pointer.y, CLOSE if over else REACH)
 
     def _light(self, pointer: Pointer) -> None:
         """The handle under the mouse."""
@@ -253,10 +227,8 @@ class CanvasTools:
         if press.button != "left" or self._bands():
             return False
         if self._lit is None:
-            picked = self.pick(press)
-            if picked is None or not is_held(scene, picked, self._session.selection):
-                return False
-            if isinstance(scene[picked], Room):  # is all around: by its arrows only
+            picked = self.selecting.held(press)
+            if picked is None or isinstance(scene[picked], Room):  # is all around: by its arrows only
                 return False
             point = self.looking.touched(press.x, press.y)
             if point is None or self._viewport.glyph_at(press.x, press.y) is not None:
@@ -290,34 +262,15 @@ class CanvasTools:
         mode, self._mode = self._mode, ""
         press, self._press = self._press, None
         if mode == "click" and press is not None and press.button == "left" and self._lit is None:
-            self._click(pointer)
+            self.selecting.click(pointer)
         elif mode == "hold":
             self.holding.commit()
         elif mode == "look":
             self.looking.end()
         elif mode == "band" and press is not None:
-            self._catch(press, pointer)
+            self.selecting.catch(press, pointer)
         self._banding = False
         self.refresh()
-
-    def _click(self, pointer: Pointer) -> None:
-        picked = self.pick(pointer)
-        chosen = self._session.selection
-        if pointer.ctrl or pointer.shift:
-            if picked is not None:
-                rest = [n for n in chosen if n != picked]
-                self._session.select(rest if picked in chosen else [*chosen, picked])
-            return
-        if self.entered is not None and picked is None:
-            self.entered = None
-        self._session.select([picked] if picked is not None else [])
-
-    def _catch(self, press: Pointer, pointer: Pointer) -> None:
-        """Choose what the band holds: to the right what lies in it, to the left what it touches."""
-        counts = self._viewport.seen_in((press.x, press.y), (pointer.x, pointer.y))
-        found = caught(self._document.scene, counts, self.entered, whole=pointer.x >= press.x)
-        more = press.ctrl or press.shift or pointer.ctrl or pointer.shift
-        self._session.select(joined(self._session.selection, found) if more else found)
 
     def _on_wheel(self, pointer: Pointer, steps: float) -> None:
         if not self.holding.active:
@@ -361,8 +314,7 @@ class CanvasTools:
         self.refresh()
 
     def _on_document(self, before: Scene, after: Scene, changes: Changes) -> None:
-        if self.entered is not None and self.entered not in after.nodes:
-            self.entered = None
+        self.selecting.follow(after)
         self.refresh()
 
     # what lies over the picture
