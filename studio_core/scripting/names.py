@@ -16,9 +16,12 @@ from studio_core.document import Document
 from studio_core.edits import Add, Assign, Compound, Edit, Move, Remove, SetFields, SetMaterial, duplicate
 from studio_core.errors import EditError, InputError
 from studio_core.params import check, param_infos
+from studio_core.rooms import new_room
 from studio_core.scene import nodes, transform
 from studio_core.scene.bounds import scene_bounds
 from studio_core.scene.nodes import Camera, Environment, Group, Material, MeshObject, Node, Scene, new_id
+from studio_core.scene.room import Room
+from studio_core.scene.room_shape import Opening
 from studio_core.scene.transform import Transform, axis_angle, vec3
 from studio_core.scripting import find as finding
 from studio_core.scripting.placing import Placing
@@ -98,6 +101,7 @@ class Names(Placing):
             made |= _classes(module, base)
         made |= {name: getattr(transform, name) for name in ("Transform", "looking", "axis_angle")}
         made |= {"Material": Material, "new_id": new_id, "duplicate": duplicate, "View": View}
+        made |= {"new_room": new_room, "Room": Room, "Opening": Opening}
         for members in GROUPS.values():
             made |= {name: getattr(self, name) for name in members if hasattr(type(self), name)}
         made |= {"document": self._document, "session": self._session, "scene": self._document.scene}

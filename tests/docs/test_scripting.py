@@ -17,6 +17,7 @@ from studio_core.parallel import Workers
 from studio_core.project.store import load
 from studio_core.registry import PluginHost
 from studio_core.scene.nodes import Camera, Environment, MeshObject, Scene
+from studio_core.scene.room import Room
 from studio_core.scripting import Interpreter, Names
 from studio_core.scripting.names import GROUPS
 from studio_core.session import Session
@@ -56,6 +57,9 @@ CHECKS: dict[str, Callable[[Scene, Scene, str, Path], bool]] = {
     ),
     "Chairs in a row with equal gaps": lambda b, a, *_: len(made(b, a)) == 2,
     "A camera on a circle around a thing": lambda b, a, *_: len([*a.of(Camera)]) == len([*b.of(Camera)]) + 4,
+    "A room beside this one, wider later": lambda b, a, *_: (
+        made(b, a) == ["Study"] and [len(room.placed()) for room in a.of(Room)] == [3]
+    ),
     "Find what is below the floor": lambda b, a, said, _: said.strip() != "" and a is b,
     "Variants of one thing, side by side": lambda b, a, *_: len(a.materials) == len(b.materials) + 3,
     "Everything as one step, or not at all": lambda b, a, *_: moved(b, a) == ["Rug", "Sofa"],

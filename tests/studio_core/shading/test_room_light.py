@@ -10,13 +10,18 @@ import pytest
 from oracles.rooms import inside
 
 from studio_core.contract import Services
+from studio_core.edits import SetFields
 from studio_core.rooms import new_room
+from studio_core.scene.diff import Changes, diff
 from studio_core.scene.geometry import Image
 from studio_core.scene.nodes import Environment, PointLamp, Scene
 from studio_core.scene.room import Room
 from studio_core.scene.room_shape import Opening, Point, l_plan
 from studio_core.scene.transform import Transform, axis_angle
+from studio_core.shading.frame import Frame
+from studio_core.shading.job import Job
 from studio_core.shading.offline import backend_params, scene_view, shade
+from studio_core.shading.pipeline import Pipeline
 
 DOOR = Opening(kind="door", wall=1, sill=0.0, width=0.9, height=2.05)
 ASKEW = Transform((103.7, 0.0, -55.1), axis_angle((0, 1, 0), 33.3))
@@ -100,3 +105,28 @@ def test_light_comes_through_an_opening_and_falls_where_it_is_seen(services, hos
     offset = np.hypot(x - points[middle, 0], y - points[middle, 1])
     expected = 3 * 1000 * (far**2 / (far**2 + offset**2) ** 2).mean()
     assert light[middle] == pytest.approx(expected, rel=0.2)
+
+
+def test_a_dragged_size_redoes_no_light_and_a_name_nothing(services, host):
+    add = new_room(openings=(DOOR,), without=(2,))
+    scene = add(Scene())
+    scene = scene.with_nodes(*scene_of(next(scene.of(Room))).nodes.values())
+    chosen = host.get("backend", "cuts")
+    params = backend_params(chosen, {"directions": "1024", "vertices": 1500})
+    pipeline = Pipeline(chosen.stages(services))
+    view = scene_view(scene, None, 32, 18)
+    pipeline.update(Frame(scene, view, params, 1), Changes(), Job("first"))
+
+    def rebuilt(edit: SetFields, revision: int) -> set[str]:
+        after = edit(scene)
+        pipeline.update(Frame(after, view, params, revision, moving=True), diff(scene, after), Job("drag"))
+        found = {run.name for run in pipeline.report if run.rebuilt}
+        pipeline.update(Frame(scene, view, params, revision + 1), diff(after, scene), Job("back"))
+        return found
+
+    room = add.nodes[0].id
+    assert rebuilt(SetFields(room, {"name": "Hall"}), 2) == set()
+    assert rebuilt(SetFields(room, {"width": 5.0}), 4) == set()
+    dragged = rebuilt(SetFields(room, {"width": 5.5}), 6)
+    assert {"CasterStage", "VisibilityStage", "RadianceStage"} <= dragged
+    assert "LightingStage" not in dragged
