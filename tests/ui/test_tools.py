@@ -134,6 +134,16 @@ def test_axis_keys_without_a_button_follow_the_mouse_until_a_click(driver: Drive
     assert len(driver.labels()) == 2
 
 
+def test_going_elsewhere_keeps_what_the_keys_began(driver: Driver) -> None:
+    choose(driver, "stool")
+    press_keys(driver, "z25cm")
+    panel = driver.window.panels["outliner"]
+    panel.filter.setFocus()
+    driver.until(lambda: not driver.document.in_gesture)
+    assert place(driver) == pytest.approx((1.0, 0.0, 0.25))
+    assert driver.labels()[1:] == ["Move Stool 25 cm along Z"]
+
+
 def test_a_drag_changes_its_axis_on_the_way(driver: Driver) -> None:
     choose(driver, "stool")
     at = driver.at(STOOL)

@@ -51,9 +51,12 @@ class Words:
 
 
 class Drag(Protocol):
-    """A gesture between press and release. `unit` is that of what can be typed; None: nothing can."""
+    """A gesture between press and release."""
 
-    unit: str | None
+    @property
+    def unit(self) -> str | None:
+        """That of what can be typed; None: nothing can."""
+        ...
 
     @property
     def label(self) -> str:

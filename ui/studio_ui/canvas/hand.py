@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 from PySide6.QtCore import QEvent, QPointF, QSize, Qt
 from PySide6.QtGui import (
+    QFocusEvent,
     QInputDevice,
     QKeyEvent,
     QMouseEvent,
@@ -33,6 +34,11 @@ _KEYS = {
 }
 _ALWAYS = frozenset({"escape", *(f"{shift}{axis}" for shift in ("", "shift+") for axis in "xyz")})
 """Keys that come here while no shortcut of the window has them."""
+_AWHILE = (
+    Qt.FocusReason.PopupFocusReason,
+    Qt.FocusReason.MenuBarFocusReason,
+    Qt.FocusReason.ActiveWindowFocusReason,
+)
 _COMMANDS = (
     Qt.KeyboardModifier.ControlModifier | Qt.KeyboardModifier.AltModifier | Qt.KeyboardModifier.MetaModifier
 )
@@ -131,6 +137,12 @@ class Hand(QWidget):
     def keyReleaseEvent(self, event: QKeyEvent) -> None:
         """The end of it."""
         self._key(event, False)
+
+    def focusOutEvent(self, event: QFocusEvent) -> None:
+        """The keyboard is somewhere else now, unless a menu or another window has it for a while."""
+        if event.reason() not in _AWHILE:
+            self.key.emit("focus", False)
+        super().focusOutEvent(event)
 
     def want_keys(self, wanted: Callable[[str], bool]) -> None:
         """Keys of these names come before all shortcuts of the window."""

@@ -9,7 +9,7 @@ from studio_core.edits import duplicate
 from studio_core.scene.nodes import NodeId
 from studio_core.session import Session
 from studio_ui.canvas.drags import CopyDrag, Drag, Hold
-from studio_ui.canvas.gizmos import NAMES, Frame, Gizmo, Handle
+from studio_ui.canvas.gizmos import NAMES, Frame, Gizmo, Handle, Kind
 from studio_ui.canvas.moving import MoveDrag
 from studio_ui.canvas.overlay import Label, Overlay
 from studio_ui.canvas.turning import SizeDrag, TurnDrag
@@ -161,7 +161,8 @@ class Holding:
         if self._hold is None or self._pointer is None or self._tool == "scale":
             return
         axis = AXES[name.removeprefix("shift+")]
-        kind = "ring" if self._tool == "rotate" else "plane" if name.startswith("shift+") else "axis"
+        kind: Kind = "plane" if name.startswith("shift+") else "axis"
+        kind = "ring" if self._tool == "rotate" else kind
         made = Handle(kind, axis)
         handle = None if made == self.handle and not self.keyed else made
         typed = self._typed.amount if self._typed is not None else None

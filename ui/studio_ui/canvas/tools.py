@@ -19,7 +19,7 @@ from studio_core.scene.room import Room
 from studio_core.session import Session
 from studio_core.signal import Signal
 from studio_ui.canvas.drags import Hold, LightDrag, Words, called
-from studio_ui.canvas.gizmos import CLOSE, REACH, Frame, Gizmo, Handle, meaning
+from studio_ui.canvas.gizmos import CLOSE, REACH, Frame, Gizmo, Handle, Kind, meaning
 from studio_ui.canvas.glyphs import glyphs
 from studio_ui.canvas.holding import AXES, Holding
 from studio_ui.canvas.looking import Looking
@@ -286,6 +286,8 @@ class CanvasTools:
 
     def _on_key(self, key: str, pressed: bool) -> None:
         if not pressed:
+            if key == "focus" and self.holding.keyed:
+                self.holding.commit()  # the hand has gone elsewhere
             return
         if self.holding.key(key):
             self.refresh()
@@ -299,10 +301,9 @@ class CanvasTools:
         hold = self._hold(self._last) if self.tool != "select" else None
         if hold is None:
             return
-        kind = {"move": "axis", "rotate": "ring", "scale": "size"}[self.tool]
-        if key.startswith("shift+") and self.tool == "move":
-            kind = "plane"
-        handle = Handle(kind, AXES[key.removeprefix("shift+")])  # type: ignore[arg-type]
+        kinds: dict[str, Kind] = {"move": "axis", "rotate": "ring", "scale": "size"}
+        kind = "plane" if key.startswith("shift+") and self.tool == "move" else kinds[self.tool]
+        handle = Handle(kind, AXES[key.removeprefix("shift+")])
         if self.holding.start(self.tool, hold, handle, keyed=True):
             self._hint("Move the mouse or type an amount; a click or Enter keeps it, Esc does not")
 

@@ -99,7 +99,8 @@ class TurnDrag:
         if handle is None:
             return np.array([0.0, 1.0, 0.0])
         if handle.kind == "ring":
-            return self._hold.frame.axes[handle.axis]
+            along: F64 = self._hold.frame.axes[handle.axis]
+            return along
         return _sight(self._hold.view, self._hold.frame.pivot)
 
     def _angle(self, pointer: Pointer) -> float:

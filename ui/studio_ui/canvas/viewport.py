@@ -135,7 +135,8 @@ class Viewport(Protocol):
         """Keys of these names come as `key` signals, before all shortcuts of the window.
 
         A letter is named as it is typed, with `shift+` before a capital one; others are `enter`,
-        `backspace`, `escape`. Keys with Ctrl, Alt or Meta have no name.
+        `backspace`, `escape`. Keys with Ctrl, Alt or Meta have no name. `focus` is released when the keyboard
+        goes to another part of the window.
         """
         ...
 
