@@ -6,10 +6,11 @@ import contextlib
 import os
 import subprocess
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 from PySide6.QtCore import QCoreApplication, QEvent, Qt
 from PySide6.QtWidgets import QApplication
@@ -40,6 +41,7 @@ from studio_ui.feed import PictureFeed, Shading
 from studio_ui.files.thumbnails import Thumbnails
 from studio_ui.journal import Journal
 from studio_ui.main_window import MainWindow
+from studio_ui.plugins.dialog import OFF
 from studio_ui.preferences.catalogue import SYSTEM
 from studio_ui.preferences.store import Preferences
 from studio_ui.settings import Settings, state_folder
@@ -113,10 +115,11 @@ def assemble(
     """A window with an empty document; what is not given is the real thing. Needs a QApplication."""
     settings = settings or Settings(state_folder())
     thumbnails = thumbnails or user_cache() / "thumbnails"
-    host = host or PluginHost.discover()
+    host = host or PluginHost.discover(settings.get(OFF, []))
     workers = Workers(threads)
     compute, files = compute or ComputeThread(), files or ComputeThread()
     journal, document, session = Journal(), Document(), Session()
+    journal.blame = partial(_blame, host)
     bridge = Bridge(lambda error: journal.problem("Something in the window", error))
 
     editing = Editing(document, journal.problem)
@@ -163,7 +166,8 @@ def run_window(path: Path | None, *, read_only: bool = False) -> int:
             studio.bridge.later(
                 COMPILE_AFTER, lambda: studio.executors[1].submit(lambda: _compile(compiling))
             )
-            return application.exec()
+            with staying():
+                return application.exec()
         finally:
             studio.close()
             for process in compiling:
@@ -224,6 +228,15 @@ def _samples() -> dict[str, Path]:
     return {}
 
 
+def _blame(host: PluginHost, doing: str, error: BaseException) -> str:
+    """The plugin of other people whose code an error went through, noted as its failure."""
+    plugin = host.culprit(error)
+    if plugin is None:
+        return ""
+    host.report(plugin.id, doing, error)
+    return plugin.label or plugin.id
+
+
 def _hook(journal: Journal) -> Callable[..., None]:
     """What an exception in a slot does: it is told, and the program goes on."""
 
@@ -235,3 +248,17 @@ def _hook(journal: Journal) -> Callable[..., None]:
         journal.problem("Something in the window", error)
 
     return tell
+
+
+@contextlib.contextmanager
+def staying() -> Iterator[None]:
+    """Inside, `sys.exit` is an error like others: in a slot or while painting Qt would end the process."""
+
+    def leave(status: object = None) -> NoReturn:
+        raise RuntimeError(f"something tried to leave the program: {status}")
+
+    before, sys.exit = sys.exit, leave
+    try:
+        yield
+    finally:
+        sys.exit = before

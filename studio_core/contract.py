@@ -118,6 +118,20 @@ class Exporter(Protocol):
         ...
 
 
+class PanelMaker(Protocol):
+    """A panel of a third-party plugin: the only place where a plugin may use Qt.
+
+    It is asked for when its panel is first shown. The context is `studio_ui.context.Context`: document,
+    session, `editing` (the way to change the document), journal, feed.
+    """
+
+    title: str
+
+    def make(self, context: Any) -> Any:
+        """A QWidget."""
+        ...
+
+
 class Registry(Protocol):
     """How plugins reach what others provide, without importing them."""
 
@@ -163,6 +177,7 @@ __all__ = [
     "ImportedModel",
     "Importer",
     "Job",
+    "PanelMaker",
     "Plugin",
     "Registry",
     "Services",

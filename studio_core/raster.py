@@ -53,6 +53,7 @@ from studio_core.shading.lamps import shown_environment
 from studio_core.shading.layers import EVERY, NO_COLOUR, PIXELS, Layer, Part, averaged, caught_hits, parts_of
 from studio_core.shading.pipeline import Inputs
 from studio_core.shading.primary import eye_in, visible_vertices
+from studio_core.shading.soundness import Soundness
 
 F32 = npt.NDArray[np.float32]
 I32 = npt.NDArray[np.int32]
@@ -73,12 +74,14 @@ class PictureStage:
     def __init__(self, services: Services) -> None:
         self._coefficients = CoefficientTable(services.registry)
         self._compositor = Compositor(services.workers)
+        self._soundness = Soundness()
         prepare()  # or the window would wait for it
 
     def run(self, frame: Frame, inputs: Inputs, job: Job) -> Picture:
         """The picture; no light is summed here. Radiance may come with hits of its own, on a finer mesh."""
         radiance = inputs[Radiance]
         hits = inputs[Hits] if radiance.hits is None else radiance.hits
+        self._soundness.check(radiance, hits)  # before kernels index with it
         table = self._coefficients(frame.scene, radiance.surfaces)
         return self._compositor.picture(frame.scene, radiance, hits, table, job)
 

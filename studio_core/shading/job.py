@@ -32,6 +32,7 @@ class Job:
         self.done = 0
         self.total = 0
         self.checkpoints = 0
+        self.ended = False  # set by whoever runs it
         self.started = time.monotonic()
         self._on_progress = on_progress
         self._on_publish = on_publish

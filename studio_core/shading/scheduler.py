@@ -11,6 +11,7 @@ import logging
 import queue
 import threading
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
@@ -22,6 +23,7 @@ from studio_core.shading.pipeline import Pipeline
 from studio_core.signal import Signal
 
 log = logging.getLogger(__name__)
+_LONGEST_WAIT = 30.0  # seconds that a program's end waits for work that was asked to stop
 
 
 class Executor(Protocol):
@@ -52,20 +54,33 @@ class ComputeThread:
 
     def __init__(self) -> None:
         self._queue: queue.SimpleQueue[Callable[[], None] | None] = queue.SimpleQueue()
-        self._thread = threading.Thread(target=self._loop, name="compute", daemon=True)
-        self._thread.start()
+        self._thread = self._start()
 
     def submit(self, work: Callable[[], None]) -> None:
         """Run `work` after what is already waiting."""
         self._queue.put(work)
 
     def close(self) -> None:
-        """Wait for what runs."""
+        """Wait for what runs, but not for ever: the process ends without a thread that never does."""
         self._queue.put(None)
-        self._thread.join()
+        self._thread.join(_LONGEST_WAIT)
 
-    def _loop(self) -> None:
-        while (work := self._queue.get()) is not None:
+    def renew(self) -> None:
+        """Do what waits, and what comes, on another thread: this one does not come back."""
+        stuck, self._queue = self._queue, queue.SimpleQueue()
+        with suppress(queue.Empty):
+            while True:
+                self._queue.put(stuck.get_nowait())
+        stuck.put(None)
+        self._thread = self._start()
+
+    def _start(self) -> threading.Thread:
+        thread = threading.Thread(target=self._loop, args=(self._queue,), name="compute", daemon=True)
+        thread.start()
+        return thread
+
+    def _loop(self, waiting: queue.SimpleQueue[Callable[[], None] | None]) -> None:
+        while (work := waiting.get()) is not None:
             try:
                 work()
             except BaseException:  # whoever submitted it should have caught it; others still need the thread
@@ -183,6 +198,7 @@ class Scheduler:
 
     def _run(self, frame: Frame, changes: Changes, job: Job) -> None:
         result, error = _attempt(lambda: self.pipeline.update(frame, changes, job))
+        job.ended = True
         self._post(lambda: self._finish(frame, job, result, error))
 
     def _finish(self, frame: Frame, job: Job, result: Any, error: Exception | None) -> None:

@@ -18,9 +18,8 @@ from pytestqt.qtbot import QtBot
 from ui_support import Driver, Make, room
 
 from studio_core.document import Document
-from studio_core.registry import PluginHost
 from studio_ui.actions.catalogue import ACTIONS, specs
-from studio_ui.dialogs import KeysDialog, PluginsDialog
+from studio_ui.dialogs import KeysDialog
 from studio_ui.feed import REST_MS
 from studio_ui.icons import ICONS, icon
 
@@ -160,11 +159,6 @@ def test_a_closed_window_lets_late_results_go(make: Make) -> None:
 
 def test_dialogs_show_what_they_are_for(make: Make) -> None:
     driver = make()
-    host = PluginHost()
-    host.report("odd", "brdf 'x' failed to load", ValueError("no such thing"))
-    plugins = PluginsDialog(driver.window, host)
-    plugins.tree.setCurrentItem(plugins.tree.topLevelItem(0))
-    assert "no such thing" in plugins.detail.toPlainText()
     assert KeysDialog(driver.window, [("Undo", "Ctrl+Z")]).windowTitle()
 
 

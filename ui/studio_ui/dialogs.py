@@ -5,16 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from PySide6.QtCore import Qt
 from PySide6.QtWidgets import (
     QDialog,
     QDialogButtonBox,
     QFileDialog,
     QInputDialog,
-    QLabel,
     QMessageBox,
-    QPlainTextEdit,
-    QSplitter,
     QTreeWidget,
     QTreeWidgetItem,
     QVBoxLayout,
@@ -23,7 +19,6 @@ from PySide6.QtWidgets import (
 
 from studio_core.project.lock import Holder
 from studio_core.project.outline import Outline
-from studio_core.registry import PluginHost
 from studio_ui.ask import Filter, LeftoverChoice, Recover, Unsaved
 from studio_ui.files.import_dialog import ImportDialog
 from studio_ui.files.import_question import ImportChoice, ImportQuestion
@@ -154,44 +149,6 @@ class Dialogs:
         """A folder to write into."""
         name = QFileDialog.getExistingDirectory(self._parent, title, self._folder)
         return Path(name) if name else None
-
-
-class PluginsDialog(QDialog):
-    """Help ▸ Plugins: what is there, and what failed with its traceback."""
-
-    def __init__(self, parent: QWidget | None, host: PluginHost) -> None:
-        super().__init__(parent)
-        self.setWindowTitle("Plugins")
-        self.resize(640, 440)
-        self.tree = QTreeWidget()
-        self.tree.setAccessibleName("Plugins")
-        self.tree.setHeaderLabels(["Plugin", "Provides"])
-        self.tree.setRootIsDecorated(False)
-        self.detail = QPlainTextEdit()
-        self.detail.setAccessibleName("What failed")
-        self.detail.setReadOnly(True)
-        for plugin in host.plugins:
-            kinds = [f"{kind}: {', '.join(names)}" for kind, names in plugin.provides.items()]
-            self.tree.addTopLevelItem(QTreeWidgetItem([plugin.label or plugin.id, "; ".join(kinds)]))
-        for failure in host.failures:
-            item = QTreeWidgetItem([f"{failure.plugin} (failed)", failure.what])
-            item.setData(0, Qt.ItemDataRole.UserRole, failure.traceback)
-            self.tree.addTopLevelItem(item)
-        self.tree.resizeColumnToContents(0)
-        self.tree.currentItemChanged.connect(
-            lambda item, _: self.detail.setPlainText(item.data(0, Qt.ItemDataRole.UserRole) or "")
-        )
-        split = QSplitter(Qt.Orientation.Vertical)
-        split.addWidget(self.tree)
-        split.addWidget(self.detail)
-        split.setSizes([280, 140])
-        column = QVBoxLayout(self)
-        if not host.failures:
-            column.addWidget(QLabel("All plugins that were needed so far have loaded."))
-        column.addWidget(split)
-        buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Close)
-        buttons.rejected.connect(self.reject)
-        column.addWidget(buttons)
 
 
 class KeysDialog(QDialog):

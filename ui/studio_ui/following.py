@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import traceback
+
 from PySide6.QtCore import QTimer
 from PySide6.QtWidgets import QMainWindow
 
@@ -14,6 +16,7 @@ from studio_ui.canvas.switch_viewport import SwitchViewport
 from studio_ui.canvas.viewport import Pointer
 from studio_ui.context import Context, Subscriptions
 from studio_ui.feed import Shown
+from studio_ui.plugins.watch import plugin_of
 from studio_ui.project_files import ProjectFiles
 from studio_ui.status import StatusBar
 
@@ -57,6 +60,7 @@ class Following:
             context.feed.failed.connect(self._failed),
             context.feed.measured.connect(self._measured),
             context.journal.added.connect(self._status.tell),
+            context.tasks.changed.connect(self.soon),
             context.warmed.connect(self._backend),
             self._files.changed.connect(self._title),
             self._files.opened.connect(self._opened),
@@ -96,6 +100,8 @@ class Following:
         steps, at = document.history, document.position
         undo = f"Undo {steps[at].label}" if document.can_undo else "Undo"
         redo = f"Redo {steps[at + 1].label}" if document.can_redo else "Redo"
+        failed = len({failure.plugin for failure in self._context.host.failures})
+        self._actions["help.plugins"].setText(f"Plugins ({failed} failed)" if failed else "Plugins")
         self._actions["edit.undo"].setText(undo)
         self._actions["edit.redo"].setText(redo)
 
@@ -143,13 +149,13 @@ class Following:
             return
         self._problem = told
         context, name = self._context, self._context.session.backend
-        if not isinstance(error, LucarneError):
-            try:
-                plugin = context.host.provider("backend", name).id
-            except LucarneError:
-                plugin = name
-            context.host.report(plugin, f"backend {name!r} failed while computing", error)
-        context.journal.problem(f"Computing the picture with {name!r}", error)
+        if isinstance(error, LucarneError):
+            context.journal.problem("Computing the picture", error)
+            return
+        plugin = plugin_of(context, name)
+        context.host.report(plugin, f"backend {name!r} failed while computing", error)
+        text = f"The picture could not be computed because of a fault in the plugin {plugin} ({error})."
+        context.journal.write(text, "problem", "".join(traceback.format_exception(error)))
 
     def _probe(self, pointer: Pointer) -> None:
         if pointer.kind == "move" and pointer.button == "none":

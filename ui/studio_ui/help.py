@@ -7,10 +7,12 @@ from collections.abc import Callable, Iterable
 from PySide6.QtWidgets import QMessageBox, QWidget
 
 from studio_core import __version__
-from studio_core.registry import PluginHost
 from studio_ui.actions.catalogue import specs
 from studio_ui.actions.mouse import MOUSE
-from studio_ui.dialogs import KeysDialog, PluginsDialog
+from studio_ui.context import Context
+from studio_ui.dialogs import KeysDialog
+from studio_ui.plugins.dialog import PluginsDialog
+from studio_ui.settings import Settings
 from studio_ui.shortcuts import Shortcuts, shown
 
 
@@ -20,12 +22,14 @@ class Help:
     def __init__(
         self,
         parent: QWidget,
-        host: PluginHost,
+        context: Context,
+        settings: Settings,
         shortcuts: Shortcuts,
         looking: Callable[[], Iterable[tuple[str, str]]],
     ) -> None:
         """`looking` tells what the mouse does to the view."""
-        self._parent, self._host, self._shortcuts, self._looking = parent, host, shortcuts, looking
+        self._parent, self._context, self._looking = parent, context, looking
+        self._settings, self._shortcuts = settings, shortcuts
 
     def handlers(self) -> dict[str, Callable[[], object]]:
         """By action id."""
@@ -43,7 +47,8 @@ class Help:
 
     def plugins(self) -> None:
         """What is loaded and what failed."""
-        PluginsDialog(self._parent, self._host).open()
+        context = self._context
+        PluginsDialog(self._parent, context.host, self._settings, context.tasks).open()
 
     def about(self) -> None:
         """Which version this is."""

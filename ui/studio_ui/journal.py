@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 import traceback
 from collections import Counter, deque
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
@@ -33,6 +34,8 @@ class Journal:
         self.cleared: Signal[[]] = Signal()
         self.seen: Signal[[]] = Signal()
         self._unseen: Counter[Level] = Counter()
+        self.blame: Callable[[str, BaseException], str] = lambda doing, error: ""
+        """Notes an error where a plugin made it; the plugin's name, or nothing."""
 
     def write(self, text: str, level: Level = "note", detail: str = "") -> None:
         """Add a line."""
@@ -50,7 +53,9 @@ class Journal:
             text = str(error)
         else:
             cause = str(error).strip().splitlines()[0] if str(error).strip() else type(error).__name__
-            text = f"{doing} did not work because of a fault in the program or a plugin ({cause})."
+            plugin = self.blame(doing, error)
+            fault = f"the plugin {plugin}" if plugin else "the program or a plugin"
+            text = f"{doing} did not work because of a fault in {fault} ({cause})."
         self.write(text, "problem", "".join(traceback.format_exception(error)))
         return text
 

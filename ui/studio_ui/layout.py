@@ -14,7 +14,8 @@ from studio_ui.settings import Settings
 from studio_ui.theme import PANEL_WIDTH
 
 _VERSION = 1  # stored layouts of another number are left alone
-_HIDDEN = ("console",)  # at first
+THIRD_PARTY = "plugin-"  # how the ids of plugins' panels begin
+_HIDDEN = ("console",)  # at first, and what plugins bring
 _TABS = (("history", "cameras", "jobs", "log"), ("properties", "materials", "lighting", "shading"))
 
 
@@ -51,8 +52,9 @@ class Layout:
         sides = [docks["outliner"], docks["properties"]]
         window.resizeDocks(sides, [PANEL_WIDTH - 40, PANEL_WIDTH + 20], Qt.Orientation.Horizontal)
         window.resizeDocks([docks["console"]], [230], Qt.Orientation.Vertical)
-        for name in _HIDDEN:
-            docks[name].hide()
+        for name, dock in docks.items():
+            if name in _HIDDEN or name.startswith(THIRD_PARTY):
+                dock.hide()
         self._first = QByteArray()
         self._before: QByteArray | None = None  # the picture was alone
 

@@ -46,6 +46,7 @@ from studio_ui.panels.all import all_panels
 from studio_ui.panels.console import ConsoleDoor
 from studio_ui.panels.panel import Panel, stacked
 from studio_ui.pictures.feature import PictureOut
+from studio_ui.plugins.watch import BackendWatch
 from studio_ui.preferences.effects import Effects
 from studio_ui.preferences.feature import PreferencesFeature
 from studio_ui.preferences.store import Preferences
@@ -101,6 +102,8 @@ class MainWindow(QMainWindow):
         load = self.transfer.load_environment
         self.drops = Drops(self, context, viewport, self.ask, self.files, self.importing, load)
         self.front = Front(context, viewport.widget, self.files, self._samples, load, self.drops.overlay)
+        self.backend_watch = BackendWatch(context, self)
+        self.front.widget.bar(self.backend_watch.bar)
         self.setCentralWidget(stacked(self.hints, self.front.widget))
         handlers, conditions = gather(features)
         self.actions_ = ActionSet(
@@ -115,6 +118,7 @@ class MainWindow(QMainWindow):
         self._make_bar()
         wearers = [
             self.front.set_theme,
+            self.backend_watch.bar.set_theme,
             self.aids.set_theme,
             self.toolbar.set_theme,
             *(panel.set_theme for panel in self.panels.values()),
@@ -184,7 +188,7 @@ class MainWindow(QMainWindow):
             self.keyboard,
             Choosing(context),
             ConsoleDoor(self.panels["console"], self.docks["console"]),
-            Help(self, context.host, self.shortcuts, self.viewing.mouse),
+            Help(self, context, settings, self.shortcuts, self.viewing.mouse),
             Rooms(context, self.status.say),
         ]
 
@@ -269,6 +273,7 @@ class MainWindow(QMainWindow):
         self.effects.close()
         self.appearance.close()
         self.preferences.close()
+        self.backend_watch.close()
         self.front.close()
         self.saved.close_panel()
         self.view_controls.close_panel()

@@ -10,6 +10,7 @@ plugin = Plugin(
         "brdf": {
             "minnaert": "lucarne_example.minnaert:MODEL",
             "unfinished": "lucarne_example.unfinished:MODEL",
-        }
+        },
+        "panel": {"census": "lucarne_example.census:MAKER"},
     },
 )

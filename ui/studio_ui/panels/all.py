@@ -22,6 +22,7 @@ from studio_ui.panels.outliner import OutlinerPanel
 from studio_ui.panels.panel import Panel
 from studio_ui.panels.properties import PropertiesPanel
 from studio_ui.panels.shading import ShadingPanel
+from studio_ui.plugins.panel import plugin_panels
 from studio_ui.settings import Settings
 
 
@@ -49,4 +50,5 @@ def all_panels(
         (LightingPanel(context, shelf, load_environment, ask.folder), right),
         (ShadingPanel(context), right),
         (ConsolePanel(context, ask, settings, save), below),
+        *((panel, right) for panel in plugin_panels(context)),
     ]

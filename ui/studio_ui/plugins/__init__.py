@@ -1,0 +1,1 @@
+"""Plugins in the window: what there is, their panels, and what happens when one misbehaves."""
