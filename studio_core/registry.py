@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import importlib
 import importlib.metadata
 import inspect
@@ -223,6 +224,8 @@ class PluginHost:
         missing = [name for name in _NEEDS.get(kind, ()) if not _has(made, name)]
         if missing:
             raise PluginError(f"{where} lacks {', '.join(missing)}")
+        if kind == "backend" and not dataclasses.is_dataclass(made.Params):
+            raise PluginError(f"{where} has Params that are no dataclass")
         return made
 
     def _contained(self, plugin: str, what: str, action: Callable[[], object]) -> bool:

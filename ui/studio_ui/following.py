@@ -60,6 +60,7 @@ class Following:
             context.feed.failed.connect(self._failed),
             context.feed.measured.connect(self._measured),
             context.journal.added.connect(self._status.tell),
+            context.journal.added.connect(lambda _: self.soon()),
             context.tasks.changed.connect(self.soon),
             context.warmed.connect(self._backend),
             self._files.changed.connect(self._title),
@@ -154,7 +155,8 @@ class Following:
             return
         plugin = plugin_of(context, name)
         context.host.report(plugin, f"backend {name!r} failed while computing", error)
-        text = f"The picture could not be computed because of a fault in the plugin {plugin} ({error})."
+        fault = f"a fault in the plugin {plugin} ({error})"
+        text = f"The picture could not be computed with {name!r} because of {fault}."
         context.journal.write(text, "problem", "".join(traceback.format_exception(error)))
 
     def _probe(self, pointer: Pointer) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -11,14 +12,15 @@ from scenes import little_scene
 
 from studio_core.contract import Services
 from studio_core.parallel import Workers
+from studio_core.raster import PictureStage
 from studio_core.registry import PluginHost
 from studio_core.scene.diff import Changes
 from studio_core.session import View
-from studio_core.shading.artifacts import TERMS, Hits, Radiance
+from studio_core.shading.artifacts import TERMS, Hits, Radiance, Surfaces
 from studio_core.shading.frame import Frame
 from studio_core.shading.job import Job
 from studio_core.shading.offline import backend_params, scene_view
-from studio_core.shading.pipeline import Pipeline
+from studio_core.shading.pipeline import Inputs, Pipeline
 from studio_core.shading.soundness import Soundness, UnsoundError
 
 
@@ -102,3 +104,26 @@ def test_hits_on_faces_that_there_are_not_are_refused(made: tuple[Radiance, Hits
             Soundness().check(radiance, replace(hits, face=face))
     with pytest.raises(UnsoundError, match="distance of its hits"):
         Soundness().check(radiance, replace(hits, distance=hits.distance[:-1]))
+
+
+WRONG: dict[str, Callable[[Any], Any]] = {
+    "numbers that are none": lambda layer: replace(layer, terms=np.full_like(layer.terms, np.nan)),
+    "a vertex too few": lambda layer: replace(layer, terms=layer.terms[:-1].copy()),
+    "another type": lambda layer: replace(layer, irradiance=layer.irradiance.astype(np.float64)),
+}
+
+
+@pytest.mark.parametrize("how", list(WRONG))
+def test_a_stage_that_gives_something_wrong_makes_no_picture(
+    how: str, made: tuple[Radiance, Hits], host: PluginHost, workers: Workers
+) -> None:
+    radiance, hits = made
+    services = Services(workers, host)
+    wrong = replace(radiance, layers={node: WRONG[how](layer) for node, layer in radiance.layers.items()})
+    stage = PictureStage(services)
+    frame = Frame(little_scene(), hits.view, None, 1)
+    given = {Surfaces: radiance.surfaces, Hits: hits, Radiance: wrong}
+    with pytest.raises(UnsoundError):
+        stage.run(frame, Inputs(given, Changes()), Job("x"))
+    given[Radiance] = radiance
+    assert np.isfinite(stage.run(frame, Inputs(given, Changes()), Job("x")).linear).all()

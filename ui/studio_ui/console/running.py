@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 import threading
 import time
 from collections.abc import Callable
@@ -83,7 +84,10 @@ class Running:
             self.dialog.show()
         self.dialog.tell(seconds, self._job)
         self._flush()
-        QApplication.processEvents(QEventLoop.ProcessEventsFlag.AllEvents, _PUMP_MS)
+        try:
+            QApplication.processEvents(QEventLoop.ProcessEventsFlag.AllEvents, _PUMP_MS)
+        except Exception:  # somebody's slot or painting: not the command's fault
+            sys.excepthook(*sys.exc_info())  # type: ignore[arg-type]
         return self.dialog.asked
 
     def end(self) -> None:
