@@ -10,8 +10,9 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 from oracles.raycast import nearest
-from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QLineEdit
+from PySide6.QtCore import QPoint, Qt
+from PySide6.QtGui import QDragEnterEvent, QDragMoveEvent
+from PySide6.QtWidgets import QApplication, QLineEdit
 from ui_support import Driver, room
 
 from studio_core.edits import Add, AddMaterial, Assign, SetTexture
@@ -107,6 +108,24 @@ def test_a_material_can_catch_shadows(driver: Driver) -> None:
     panel.common.fields["catches"].box.click()  # type: ignore[attr-defined]
     assert driver.document.scene.material("blue").catches
     assert driver.labels()[1:] == ["Catches shadows of Blue"]
+
+
+def test_a_drag_that_begins_beside_the_picture_is_followed(driver: Driver) -> None:
+    """Who ignores that a drag comes in is told nothing more of it."""
+    panel = choose(driver, "blue")
+    data = panel.list.mimeData([panel.list.rows["blue"]])
+    copy, left = Qt.DropAction.CopyAction, Qt.MouseButton.LeftButton
+    keys = Qt.KeyboardModifier.NoModifier
+    enter = QDragEnterEvent(QPoint(3, 3), copy, data, left, keys)
+    QApplication.sendEvent(driver.window, enter)
+    assert enter.isAccepted()
+    move = QDragMoveEvent(QPoint(3, 3), copy, data, left, keys)
+    QApplication.sendEvent(driver.window, move)
+    assert not move.isAccepted(), "nothing there can have a material"
+    at = driver.viewport.mapTo(driver.window, driver.at((1.0, 0.5, 0.5)))
+    move = QDragMoveEvent(at, copy, data, left, keys)
+    QApplication.sendEvent(driver.window, move)
+    assert move.isAccepted()
 
 
 def two_slots() -> MeshObject:

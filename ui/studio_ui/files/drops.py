@@ -46,7 +46,10 @@ class Drops(QObject):
         kind = event.type()
         if kind == QEvent.Type.DragEnter and isinstance(event, QDragMoveEvent):
             self._intent = intent(event.mimeData(), self._known())
-            return self._over(event)
+            self._over(event)
+            if self._intent is not None:
+                event.accept()  # who ignores this is told of no move: a material comes from beside the canvas
+            return True
         if kind == QEvent.Type.DragMove and isinstance(event, QDragMoveEvent):
             return self._over(event)
         if kind == QEvent.Type.DragLeave:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 
-from PySide6.QtCore import QItemSelectionModel, QMimeData, QSignalBlocker, QSize, Qt
-from PySide6.QtGui import QColor
+from PySide6.QtCore import QItemSelectionModel, QMimeData, QPoint, QSignalBlocker, QSize, Qt
+from PySide6.QtGui import QColor, QDrag
 from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QTreeWidget, QTreeWidgetItem
 
 from studio_core.scene.nodes import Material, MaterialId, MeshObject, Scene
@@ -102,6 +102,17 @@ class MaterialList(QTreeWidget):
         current = self.currentItem()
         item = current if current in items or not items else items[0]
         return material_data(item.data(_NAME, _ROLE))
+
+    def startDrag(self, supportedActions: Qt.DropAction) -> None:
+        """Its swatch goes with the mouse, so that what is below can be seen."""
+        item = self.currentItem()
+        if item is None:
+            return
+        drag = QDrag(self)
+        drag.setMimeData(self.mimeData([item]))
+        drag.setPixmap(item.icon(_NAME).pixmap(QSize(SIZE, SIZE)))
+        drag.setHotSpot(QPoint(-6, -6))
+        drag.exec(Qt.DropAction.CopyAction)
 
     def supportedDropActions(self) -> Qt.DropAction:
         """It stays in the list."""
