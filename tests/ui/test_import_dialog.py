@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from names import nameless
 from PySide6.QtWidgets import QApplication
 from ui_support import Driver, Make, block, box, room
 
@@ -111,6 +112,7 @@ def test_the_dialog_shows_sizes_and_gives_what_was_chosen(qapp: QApplication) ->
     assert asked.guess.unit == 0.01
     assert "unusual" in asked.doubt
     dialog = ImportDialog(None, asked)
+    assert nameless(dialog) == []
     assert dialog.choice() == asked.guess
     assert dialog.size.text().startswith("0.75 × 0.75 × 1.5")
     dialog.unit.setCurrentIndex(2)  # millimetres

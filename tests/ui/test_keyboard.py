@@ -2,51 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-
 import pytest
+from names import nameless
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtGui import QContextMenuEvent
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QAbstractButton, QApplication, QLabel, QLineEdit, QWidget
+from PySide6.QtWidgets import QApplication, QLineEdit, QWidget
 from pytestqt.qtbot import QtBot
 from ui_support import Driver
 
 from studio_core.params import ParamInfo
 from studio_core.registry import PluginHost
+from studio_ui.console.running import StopDialog
 from studio_ui.dialogs import KeysDialog, PluginsDialog
 from studio_ui.fields import TextField
+from studio_ui.files.report import ReportDialog
 from studio_ui.keyboard import in_order
 from studio_ui.sinks import PlainSink
-
-INNER = ("qt_spinbox_lineedit", "qt_scrollarea_hcontainer", "qt_scrollarea_vcontainer")
-
-
-def reached(root: QWidget) -> Iterable[QWidget]:
-    """What Tab can reach in a window, as far as it is seen or could be."""
-    for widget in root.findChildren(QWidget):
-        own = widget.window() is root.window() and widget.objectName() not in INNER
-        if own and widget.focusPolicy() & Qt.FocusPolicy.TabFocus:
-            yield widget
-
-
-def said(widget: QWidget) -> str:
-    """What a screen reader would say of a control."""
-    if widget.accessibleName():
-        return widget.accessibleName()
-    if isinstance(widget, QAbstractButton):
-        action = getattr(widget, "defaultAction", lambda: None)()
-        return widget.text() or (action.text() if action is not None else "")
-    labels = widget.window().findChildren(QLabel)
-    return next((label.text() for label in labels if label.buddy() is widget), "")
-
-
-def nameless(root: QWidget) -> list[str]:
-    return [
-        " < ".join(type(w).__name__ for w in (widget, widget.parentWidget()))
-        for widget in reached(root)
-        if not said(widget)
-    ]
 
 
 def usable(place: QWidget) -> list[QWidget]:
@@ -72,6 +44,8 @@ def test_every_control_of_the_dialogs_has_a_name(chosen: Driver) -> None:
     host.report("odd", "failed", ValueError("no"))
     preferences = chosen.window.preferences_.open()
     dialogs = [
+        ReportDialog(chosen.window, "Report", "It went wrong.", "Try again.", "Traceback"),
+        StopDialog(chosen.window),
         PluginsDialog(chosen.window, host),
         KeysDialog(chosen.window, [("Undo", "Ctrl+Z")]),
         preferences,

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from names import nameless
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QGuiApplication, QImage
 from PySide6.QtWidgets import QAbstractButton, QComboBox, QLineEdit
@@ -121,6 +122,7 @@ def test_a_picture_is_ordered_with_what_the_window_shows(out: tuple[Driver, Chil
     driver.session.shade_with("cuts", {"quality": 0.75, "refine": False})
     dialog = dialog_of(driver, "file.export_picture")
     assert isinstance(dialog, ExportDialog)
+    assert nameless(dialog) == []
     dialog.size_form.preset.setCurrentIndex(dialog.size_form.preset.findText("4K  3840 × 2160"))
     export(driver, dialog)
     options = options_of(stand_in)
@@ -288,6 +290,7 @@ def test_a_turntable_goes_around_what_is_chosen(out: tuple[Driver, Child], tmp_p
     driver.session.select(["stool"])
     dialog = dialog_of(driver, "file.export_series")
     assert isinstance(dialog, SeriesDialog)
+    assert nameless(dialog) == []
     dialog.count.setValue(12)
     assert dialog.length.value() == pytest.approx(0.5)
     dialog.length.setValue(2.0)

@@ -19,8 +19,7 @@ from studio_core.params import check
 from studio_core.shading.job import Job
 from studio_ui.appearance import system_theme
 from studio_ui.preferences.cache_part import empty, size_of
-from studio_ui.preferences.catalogue import ALL, BY_NAME, FILES, PAGES, Preference
-from studio_ui.preferences.dialog import KEYS
+from studio_ui.preferences.catalogue import ALL, BY_NAME, FILES, KEYS, PAGES, Preference
 from studio_ui.preferences.rows import PreferenceRows
 from studio_ui.preferences.store import Preferences
 from studio_ui.settings import Settings

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from names import nameless
 from project_support.disk import environment
 from PySide6.QtWidgets import QApplication, QLabel
 from ui_support import Answers, Driver, Make, room
@@ -143,6 +144,7 @@ def words(dialog: object) -> str:
 
 def test_the_dialog_tells_both_versions_apart(qapp: QApplication) -> None:
     dialog = RecoveryDialog(None, leftover())
+    assert nameless(dialog) == []
     text = words(dialog)
     for part in ("flat", "5 objects", "3 objects", "Done last: Move chair", "Turn light", "9 September 2001"):
         assert part in text
@@ -161,6 +163,7 @@ def test_the_dialog_tells_both_versions_apart(qapp: QApplication) -> None:
 def test_several_leftovers_are_opened_discarded_or_kept(qapp: QApplication) -> None:
     found = [leftover(with_saved=False) for _ in range(3)]
     dialog = LeftoversDialog(None, found)
+    assert nameless(dialog) == []
     assert "3 scenes" in words(dialog)
     dialog.rows[1][3].click()
     assert dialog.rows[1][1].isHidden()
@@ -336,6 +339,7 @@ def test_the_versions_dialog_lists_the_newest_first(qapp: QApplication) -> None:
     late, early = Revision(2, 1, "Saved", 2e9, "a"), Revision(1, None, "Saved", 1e9, "b")
     found = [Outline(late, {"mesh": 2}, 1, ("Move",)), Outline(early, {"mesh": 1}, 1)]
     dialog = VersionsDialog(None, "flat", found)
+    assert nameless(dialog) == []
     assert dialog.tree.topLevelItem(0).text(0).endswith("(newest)")
     assert dialog.chosen is found[1], "the newest is what is open"
     empty = VersionsDialog(None, "flat", [])

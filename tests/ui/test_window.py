@@ -201,4 +201,9 @@ def test_hints_are_ticked_off_and_never_come_again(make: Make, tmp_path: Path) -
     assert driver.viewport.size() == size, "a text must not resize the picture"
     driver.window.hints.dismiss()
     driver.close()
-    assert make(state=state).window.hints.isHidden()
+    again = make(state=state)
+    again.show(room())
+    assert again.window.hints.isHidden()
+    again.do("help.hints")
+    assert again.window.hints.isVisible()
+    assert again.window.hints._labels[0].text().startswith("1")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QSizePolicy, QToolButton
 
@@ -48,6 +50,21 @@ class HintBar(QFrame):
         layout.addWidget(self._close)
         self._subscriptions = Subscriptions()
         self._subscriptions.add(context.editing.document.changed.connect(self._edited))
+        self._write()
+        self.setVisible(self._wanted())
+
+    def handlers(self) -> dict[str, Callable[[], object]]:
+        """By action id."""
+        return {"help.hints": self.begin_again}
+
+    def conditions(self) -> dict[str, Callable[[], bool]]:
+        """By name."""
+        return {"furnished": lambda: bool(self._document.scene.nodes)}
+
+    def begin_again(self) -> None:
+        """All three, as at the first start."""
+        self._settings.set("hinted", None)
+        self._done.clear()
         self._write()
         self.setVisible(self._wanted())
 

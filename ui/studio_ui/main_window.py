@@ -186,6 +186,7 @@ class MainWindow(QMainWindow):
             self.palette_,
             chosen,
             self.keyboard,
+            self.hints,
             Choosing(context),
             ConsoleDoor(self.panels["console"], self.docks["console"]),
             Help(self, context, settings, self.shortcuts, self.viewing.mouse),

@@ -10,6 +10,9 @@ ITEMS: tuple[Item, ...] = (
         "Ctrl+Shift+P",
         "Everything the menus offer, by a few letters",
     ),
+    ActionSpec(
+        "help.hints", "First steps", "Help", "", "Three things to try, above the picture", enabled="furnished"
+    ),
     ActionSpec("help.keys", "Keys and mouse", "Help", "F1"),
     ActionSpec("help.plugins", "Plugins", "Help"),
     ActionSpec("help.about", "About Lucarne", "Help"),

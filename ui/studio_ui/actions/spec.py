@@ -55,6 +55,7 @@ REASONS = {
     "has_file": "The project is in no file yet",
     "own_file": "The project is in no file that can be changed",
     "picture": "There is no picture yet",
+    "furnished": "There is nothing in the scene",
     "computing": "Nothing is being computed",
 }
 """Every condition that `enabled` names, with what is told while it does not hold."""

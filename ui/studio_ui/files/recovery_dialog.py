@@ -97,6 +97,7 @@ class LeftoversDialog(QDialog):
             rows.addWidget(self._row(left))
         rows.addStretch(1)
         area = QScrollArea()
+        area.setFocusPolicy(Qt.FocusPolicy.NoFocus)  # its buttons scroll into sight
         area.setWidgetResizable(True)
         area.setFrameShape(QFrame.Shape.NoFrame)
         area.setWidget(inside)

@@ -16,6 +16,7 @@ from studio_ui.canvas.presets import LUCARNE, PRESETS
 
 GENERAL, NAVIGATION, SNAPPING, PICTURE, FILES = "General", "Navigation", "Snapping", "Picture", "Files"
 PAGES = (GENERAL, NAVIGATION, SNAPPING, PICTURE, FILES)
+KEYS = "Keys"  # a page of its own
 SYSTEM = "system"
 
 
@@ -52,8 +53,11 @@ def _flag(name: str, page: str, label: str, doc: str, default: bool = True) -> P
     return Preference(name, page, ParamInfo("flag", label, doc), default)
 
 
-def _number(name: str, page: str, label: str, doc: str, default: float, **info: object) -> Preference:
-    return Preference(name, page, ParamInfo("number", label, doc, **info), default)  # type: ignore[arg-type]
+def _number(
+    name: str, page: str, label: str, doc: str, default: float, *, restart: bool = False, **info: object
+) -> Preference:
+    made = ParamInfo("number", label, doc, **info)  # type: ignore[arg-type]
+    return Preference(name, page, made, default, restart=restart)
 
 
 ALL: tuple[Preference, ...] = (
@@ -93,7 +97,7 @@ ALL: tuple[Preference, ...] = (
     _number("autosave", FILES, "Autosave after", "How soon after a change it is kept beside the project", 1.0,
             unit="s", low=1.0, high=600.0, scale="log"),
     _number("cache", FILES, "Keep at most", "Disk space for what was computed, shared by all projects",
-            1024.0, unit="MB", low=64.0, high=65536.0, scale="log"),
+            1024.0, restart=True, unit="MB", low=64.0, high=65536.0, scale="log"),
 )  # fmt: skip
 """In the order of the pages."""
 

@@ -20,14 +20,12 @@ from PySide6.QtWidgets import (
 
 from studio_ui.panels.panel import heading
 from studio_ui.preferences.cache_part import CachePart
-from studio_ui.preferences.catalogue import ALL, BY_NAME, FILES, PAGES
+from studio_ui.preferences.catalogue import ALL, BY_NAME, FILES, KEYS, PAGES
 from studio_ui.preferences.keys_page import KeysPage
 from studio_ui.preferences.rows import PreferenceRows
 from studio_ui.preferences.store import Preferences
 from studio_ui.shortcuts import Shortcuts
 from studio_ui.tasks import Tasks
-
-KEYS = "Keys"
 
 
 class PreferencesDialog(QDialog):

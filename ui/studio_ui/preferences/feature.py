@@ -5,16 +5,19 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from PySide6.QtWidgets import QWidget
 
 from studio_ui.number_style import NumberStyle, set_number_style
 from studio_ui.palette import Entry
-from studio_ui.preferences.catalogue import ALL, SYSTEM
-from studio_ui.preferences.dialog import KEYS, PreferencesDialog
+from studio_ui.preferences.catalogue import ALL, KEYS, SYSTEM
 from studio_ui.preferences.store import Preferences
 from studio_ui.shortcuts import Shortcuts
 from studio_ui.tasks import Tasks
+
+if TYPE_CHECKING:
+    from studio_ui.preferences.dialog import PreferencesDialog
 
 
 class PreferencesFeature:
@@ -39,6 +42,8 @@ class PreferencesFeature:
 
     def open(self, *, page: str = "", name: str = "") -> PreferencesDialog:
         """Show the dialog, at a page or at a preference."""
+        from studio_ui.preferences.dialog import PreferencesDialog  # not needed to start
+
         if self._dialog is None:
             self._dialog = PreferencesDialog(
                 self._window, self._preferences, self._shortcuts, self._tasks, self._cache
