@@ -77,8 +77,10 @@ def test_every_action_is_found_by_its_name(driver: Driver) -> None:
     driver.do("help.palette")
     palette = driver.window.palette_
     listed = {found.name for found in palette.found}
-    assert {spec.id for spec in specs()} <= listed
-    for spec in specs():
+    shown = [spec for spec in specs() if driver.window.actions_[spec.id].isVisible()]
+    assert {spec.id for spec in shown} <= listed
+    assert len(shown) > 60
+    for spec in shown:
         palette.edit.setText(driver.window.actions_[spec.id].text())
         assert spec.id in [found.name for found in palette.found[:4]], spec.text
     palette.close()
@@ -112,7 +114,7 @@ def test_cameras_panels_and_themes_are_found(driver: Driver) -> None:
     driver.do("view.new_camera")
     type_in(driver, "cameras camera")
     palette = driver.window.palette_
-    assert "Cameras" in palette.found[0].place
+    assert "View ▸ Cameras" in [found.place for found in palette.found[:3]]
     palette.edit.setText("outliner")
     assert palette.found[0].checked, "the panel is shown"
     palette.close()
