@@ -17,7 +17,7 @@ from ui_support import Driver, Make
 from studio_ui.actions.catalogue import specs
 from studio_ui.preferences.keys_page import KeysPage
 from studio_ui.settings import Settings
-from studio_ui.shortcuts import Shortcuts, portable, refused
+from studio_ui.shortcuts import Shortcuts, portable
 
 DEFAULTS = {"a": "Ctrl+A", "b": "Ctrl+B", "c": "", "d": "D"}
 
@@ -27,10 +27,10 @@ def kept(tmp_path: Path) -> Settings:
     return Settings(tmp_path)
 
 
-def test_the_catalogue_s_keys_are_keys_that_actions_can_have() -> None:
+def test_the_catalogue_s_keys_are_keys_that_actions_can_have(kept: Settings) -> None:
     for spec in specs():
         assert not spec.shortcut or portable(spec.shortcut), spec.id
-        assert not refused(portable(spec.shortcut)), spec.id
+        assert not Shortcuts(kept).refuses(spec.id, portable(spec.shortcut)), spec.id
 
 
 def test_a_key_is_taken_from_what_had_it_and_remembered(kept: Settings) -> None:
@@ -84,6 +84,14 @@ def test_damaged_keys_are_left_out(kept: Settings) -> None:
     kept.set("shortcuts", {"a": 7, "b": "no such key", "gone": "F9", "c": "Esc", "d": "Ctrl+K, Ctrl+D"})
     shortcuts = Shortcuts(kept, DEFAULTS)
     assert {name: shortcuts.of(name) for name in DEFAULTS} == DEFAULTS
+
+
+def test_tab_is_for_the_picture_alone(kept: Settings) -> None:
+    shortcuts = Shortcuts(kept)
+    shortcuts.give("view.frame_all", "Tab")
+    assert Shortcuts(Settings(kept.folder)).of("view.frame_all") == "Tab"
+    with pytest.raises(ValueError, match="control to control"):
+        shortcuts.give("file.new", "Tab")
 
 
 @pytest.mark.parametrize("keys", ["Esc", "Tab", "Return", "Space", "Nonsense+Q"])
@@ -145,7 +153,7 @@ def test_a_key_is_recorded_or_asked_about(kept: Settings, qtbot: QtBot) -> None:
     page.reset_all.click()
     assert shortcuts.of("file.save") == "Ctrl+S"
     page.edit.setKeySequence(QKeySequence("Tab"))
-    assert "Tab" in page.told.text()
+    assert "Tab" in page.told.text(), "this one works in the whole window"
     assert shortcuts.of("file.save") == "Ctrl+S"
     page.close_panel()
 

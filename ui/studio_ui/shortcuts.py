@@ -24,6 +24,8 @@ _TAKEN = {
     "Menu": "This key opens the context menu",
 }
 """Keys that no action can have, and why. In Qt's portable spelling."""
+_CANVAS = ("Tab",)
+"""Of these, what actions of the picture alone can have: F6 goes on from there."""
 _MODIFIERS = (Qt.Key.Key_Control, Qt.Key.Key_Shift, Qt.Key.Key_Alt, Qt.Key.Key_Meta, Qt.Key.Key_AltGr)
 
 
@@ -38,13 +40,14 @@ class Shortcuts:
         self.changed: Signal[[]] = Signal()
         self._settings = settings
         given = {spec.id: spec.shortcut for spec in specs()} if defaults is None else defaults
+        self._canvas = {spec.id for spec in specs() if spec.canvas}
         self._defaults = {name: portable(keys) for name, keys in given.items()}
         stored = settings.get(_KEPT, {})
         self._own: dict[str, str] = {}
         for name, keys in stored.items():
             if name in self._defaults and isinstance(keys, str) and (not keys or portable(keys)):
                 fresh = portable(keys)
-                if not fresh or (fresh not in self._own.values() and not refused(fresh)):
+                if not fresh or (fresh not in self._own.values() and not self.refuses(name, fresh)):
                     self._own[name] = fresh
 
     def of(self, name: str) -> str:
@@ -72,13 +75,17 @@ class Shortcuts:
     def give(self, name: str, keys: str) -> None:
         """Give an action a key (or none), and take it from whatever had it. ValueError for keys refused."""
         fresh = portable(keys)
-        if refused(fresh) or (keys and not fresh):
-            raise ValueError(refused(fresh) or f"{keys} is no key")
+        if self.refuses(name, fresh) or (keys and not fresh):
+            raise ValueError(self.refuses(name, fresh) or f"{keys} is no key")
         loser = self.holder(fresh, but=name)
         if loser:
             self._own[loser] = ""
         self._own[name] = fresh
         self._keep()
+
+    def refuses(self, name: str, keys: str) -> str:
+        """Why an action cannot have a key; empty when it can."""
+        return "" if keys in _CANVAS and name in self._canvas else _TAKEN.get(keys, "")
 
     def reset(self, name: str) -> None:
         """The key of the catalogue again, taken from whatever has it now."""
@@ -103,11 +110,6 @@ def portable(keys: str) -> str:
     if sequence.count() != 1 or sequence[0].key() in (Qt.Key.Key_unknown, *_MODIFIERS):
         return ""
     return sequence.toString(QKeySequence.SequenceFormat.PortableText)
-
-
-def refused(keys: str) -> str:
-    """Why no action can have that key; empty when it can."""
-    return _TAKEN.get(keys, "")
 
 
 def shown(keys: str) -> str:

@@ -19,7 +19,7 @@ from PySide6.QtWidgets import (
 
 from studio_ui import fuzzy
 from studio_ui.actions.catalogue import specs
-from studio_ui.shortcuts import Shortcuts, portable, refused, shown
+from studio_ui.shortcuts import Shortcuts, portable, shown
 
 _ID = Qt.ItemDataRole.UserRole
 
@@ -135,7 +135,7 @@ class KeysPage(QWidget):
         name, keys = self._chosen, portable(sequence.toString(QKeySequence.SequenceFormat.PortableText))
         if not name or not keys:
             return
-        why = refused(keys)
+        why = self._shortcuts.refuses(name, keys)
         holder = self._shortcuts.holder(keys, but=name)
         if why:
             self._show()
