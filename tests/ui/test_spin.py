@@ -9,7 +9,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from PySide6.QtCore import QLocale, QPoint, Qt
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QFormLayout, QToolTip, QWidget
+from PySide6.QtWidgets import QApplication, QFormLayout, QLineEdit, QToolTip, QWidget
 from pytestqt.qtbot import QtBot
 
 from studio_core.params import ParamInfo
@@ -18,6 +18,7 @@ from studio_ui.fields import NumberField
 from studio_ui.number_style import NumberStyle, number_style, set_number_style
 from studio_ui.param_form import form_label
 from studio_ui.spin import ScrubLabel, Spin
+from studio_ui.theme import DARK, wear
 
 LENGTH = ParamInfo("number", "Width", unit="m")
 ANGLE = ParamInfo("number", "Angle", unit="°", low=-180, high=180)
@@ -209,6 +210,15 @@ def test_steps_are_bigger_with_shift_and_smaller_with_ctrl(qtbot: QtBot) -> None
     whole.setValue(5)
     QTest.keyClick(whole, Qt.Key.Key_Down, CTRL)
     assert whole.value() == 4
+
+
+def test_a_number_is_as_high_as_a_line_of_text(qtbot: QtBot, qapp: QApplication) -> None:
+    wear(qapp, DARK)
+    spin, line = Spin(LENGTH), QLineEdit()
+    shown(qtbot, spin)
+    shown(qtbot, line)
+    assert spin.height() == line.height()
+    assert spin.lineEdit().height() >= spin.fontMetrics().height()
 
 
 def test_a_held_key_is_one_gesture(qtbot: QtBot) -> None:

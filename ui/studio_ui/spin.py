@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 
-from PySide6.QtCore import QPoint, QSignalBlocker, Qt, Signal
+from PySide6.QtCore import QPoint, QSignalBlocker, QSize, Qt, Signal
 from PySide6.QtGui import QFocusEvent, QKeyEvent, QMouseEvent, QShowEvent, QValidator, QWheelEvent
 from PySide6.QtWidgets import QApplication, QDoubleSpinBox, QLabel, QToolTip, QWidget
 
@@ -20,6 +20,7 @@ MIXED = "—"
 """Shown where several things are edited at once and differ."""
 _WIDEST = 1e9
 _PRECISION = 9  # decimals of the value itself; what is shown has fewer
+_LINE, _FRAME = 18, 8  # pixels: the text, and the theme's padding and border
 _NOTCH = 120  # of a mouse wheel
 _SLIP = 3  # pixels before a press on a label becomes a drag
 _KEYS = {
@@ -83,6 +84,15 @@ class Spin(QDoubleSpinBox):
         if self.mixed and edited:
             self.mixed = False
             self.valueChanged.emit(self.value())
+
+    def sizeHint(self) -> QSize:
+        """As high as a line of text is; Qt adds the margins of the line inside."""
+        hint = super().sizeHint()
+        return QSize(hint.width(), max(self.fontMetrics().height() + 3, _LINE) + _FRAME)
+
+    def minimumSizeHint(self) -> QSize:
+        """As high as `sizeHint`."""
+        return QSize(super().minimumSizeHint().width(), self.sizeHint().height())
 
     # text
 
