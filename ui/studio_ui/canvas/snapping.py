@@ -28,6 +28,7 @@ SCALE_STEP = 0.05
 _PASSES = 4
 _STUDS = ((0, 0), (0, 1), (1, 0), (1, 1), (2, 2))  # low, high, middle of what moves, and of the other
 _GUIDE = "#ffd54a"
+_ABOVE = (8.0, -26.0)  # logical pixels: what is told of the movement itself stands below
 
 
 @dataclass(frozen=True)
@@ -225,9 +226,11 @@ def _guide(met: Met, moved: F64, other: F64, name: str, words: Callable[[float],
             Dot(start, _GUIDE, 2.5),
             Dot(end, _GUIDE, 2.5),
         ]
-        marks.append(Label((start + end) / 2, f"{name} · {words(gap)}", _GUIDE, (8.0, 6.0)))
+        marks.append(Label((start + end) / 2, f"{name} · {words(gap)}", _GUIDE, _ABOVE))
     else:
-        marks.append(Label(start, name, _GUIDE, (8.0, 6.0)))
+        top = np.where(np.arange(3) == 1, other[1], other.mean(axis=0))
+        top[met.axis] = met.at
+        marks.append(Label(top, name, _GUIDE, _ABOVE))
     return marks
 
 
