@@ -89,3 +89,24 @@ def suspicious_size(model: ImportedModel) -> str | None:
     fits = [name for factor, name in _UNITS if 0.2 <= longest * factor <= 5]
     guess = f"is the file in {' or '.join(fits[:2])}?" if longest > LARGEST and fits else "which unit has it?"
     return f"The model would be {told} m (width × depth × height); {guess}"
+
+
+def pivot_words(scene: Scene, node: NodeId) -> str:
+    """Where a node's origin is in what hangs under it, about which it turns and scales; "" without a mesh."""
+    box = own_box(scene, node)
+    if box is None:
+        return ""
+    scale = scene.world(node).scale
+    above = -float(box[0, 1]) * scale
+    aside = float(np.hypot(*(box[:, [0, 2]].mean(axis=0)))) * scale
+    tall = float(box[1, 1] - box[0, 1]) * scale
+    slack = 0.02 * max(float((box[1] - box[0]).max()) * scale, 1e-9)
+    if abs(above) <= slack:
+        height = "at its base"
+    elif abs(above - tall) <= slack:
+        height = "at its top"
+    elif abs(above - tall / 2) <= slack:
+        height = "at half its height"
+    else:
+        height = f"{abs(above):.2f} m {'above' if above > 0 else 'below'} its base"
+    return f"{height}, {'in the middle' if aside <= slack else f'{aside:.2f} m from the middle'}"

@@ -284,3 +284,16 @@ def test_kinds_have_names() -> None:
     assert issubclass(MeshObject, object)
     assert kind_name(Camera(id="c")) == "Camera"
     assert Environment.__mro__[1].__name__ == "Light"
+
+
+def test_what_was_dropped_into_a_closed_group_is_in_sight(driver: Driver) -> None:
+    """A tree unfolds nothing while a drop is under way."""
+    panel = driver.window.panels["outliner"]
+    driver.session.select(["stool"])
+    assert not panel.tree.isExpanded(panel.index_of("chair"))
+    data = panel.model.mimeData([panel.model.of("stool")])
+    panel.tree.setState(panel.tree.State.DraggingState)
+    panel.model.dropMimeData(data, MOVE, -1, 0, panel.model.of("chair"))
+    panel.tree.setState(panel.tree.State.NoState)
+    driver.until(lambda: panel.tree.isExpanded(panel.index_of("chair")))
+    assert panel.tree.currentIndex() == panel.index_of("stool")

@@ -13,7 +13,7 @@ from PySide6.QtCore import Qt
 from ui_support import Driver, box, room
 
 from studio_core.edits import Add, Move, SetFields
-from studio_core.scene.geometry import Image
+from studio_core.scene.geometry import Geometry, Image
 from studio_core.scene.nodes import (
     AreaLamp,
     Camera,
@@ -23,7 +23,7 @@ from studio_core.scene.nodes import (
     PointLamp,
     SpotLamp,
 )
-from studio_core.scene.size import own_size, resized
+from studio_core.scene.size import own_size, pivot_words, resized
 from studio_core.scene.transform import Transform, axis_angle
 from studio_ui.panels.light_fields import kelvin_colour, to_fov, to_lens
 from studio_ui.panels.light_hints import kelvin_words, light_hint, paper_radiance, to_ev
@@ -132,6 +132,7 @@ def test_a_typed_size_scales_and_leaves_it_standing(driver: Driver) -> None:
     assert made.scale == pytest.approx(2.0)
     assert made.translation == pytest.approx((1.0, 0.25, 0.0)), "its base is its pivot"
     assert driver.labels()[2:] == ["Resize Stool"]
+    assert panel.place.pivot.text() == "Pivot at its base, in the middle"
     driver.until(lambda: not panel.place.resets["rotation"].isHidden())
     panel.place.resets["rotation"].click()
     assert driver.document.scene["stool"].transform.rotation == (1.0, 0.0, 0.0, 0.0)
@@ -163,6 +164,25 @@ def test_resizing_keeps_the_middle_of_the_base(
     assert old is not None
     assert new == pytest.approx([side * factor for side in old])
     assert old == pytest.approx([1.3 * scale] * 3, rel=1e-6), "turning makes nothing wider"
+
+
+@pytest.mark.parametrize(
+    ("low", "words"),
+    [
+        ((-0.5, 0.0, -0.5), "at its base, in the middle"),
+        ((-0.5, -1.0, -0.5), "at its top, in the middle"),
+        ((-0.5, -0.5, -0.5), "at half its height, in the middle"),
+        ((0.0, -0.2, -0.5), "0.40 m above its base, 1.00 m from the middle"),
+        ((-0.5, 0.3, -0.5), "0.60 m below its base, in the middle"),
+    ],
+)
+def test_the_pivot_is_told(low: tuple[float, float, float], words: str) -> None:
+    corners = box().positions - box().positions.min(axis=0) + np.array(low, np.float32)
+    geometry = Geometry(corners, box().faces)
+    mesh = MeshObject(id="m", geometry=geometry, materials=("red",), transform=Transform(scale=2.0))
+    scene = Add((mesh,))(room())
+    assert pivot_words(scene, "m") == words
+    assert pivot_words(Add((Camera(id="c"),))(scene), "c") == ""
 
 
 def test_materials_of_several(driver: Driver) -> None:

@@ -115,6 +115,7 @@ QTreeView, QListView, QTableView, QPlainTextEdit { background: $base; border: 1p
     border-radius: 4px; outline: 0; selection-background-color: $accent; selection-color: $on_accent; }
 QTreeView:focus, QListView:focus, QTableView:focus, QPlainTextEdit:focus { border-color: $accent; }
 QTreeView::item, QListView::item { padding: 3px 2px; }
+QAbstractItemView QLineEdit { border-radius: 0; padding: 0 2px; margin: 0; min-height: 0; }
 QTreeView::item:hover, QListView::item:hover { background: $raised; }
 QTreeView::item:selected, QListView::item:selected { background: $accent; color: $on_accent; }
 QHeaderView::section { background: $window; color: $dim; border: none; padding: 4px 6px; }

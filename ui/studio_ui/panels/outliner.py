@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 
-from PySide6.QtCore import QItemSelection, QItemSelectionModel, QModelIndex, QPoint, Qt
+from PySide6.QtCore import QItemSelection, QItemSelectionModel, QModelIndex, QPoint, Qt, QTimer
 from PySide6.QtGui import QAction, QShowEvent
 from PySide6.QtWidgets import QLineEdit, QMenu
 
@@ -62,6 +62,9 @@ class OutlinerPanel(Panel):
         self.column.addLayout(row(self.filter, self.kind, stretch=0))
         self.column.addWidget(self.tree, 1)
         self._open: set[NodeId] = set()
+        self._reveal = QTimer(self)
+        self._reveal.setSingleShot(True)
+        self._reveal.timeout.connect(self._selected)
         self._following = self._folding = False
         self._sweeping: tuple[str, bool] | None = None
         self._swept: list[NodeId] = []
@@ -109,6 +112,7 @@ class OutlinerPanel(Panel):
         if restructured:
             self._unfold()
             self._selected()
+            self._reveal.start(0)  # a tree that is dropped on unfolds nothing before the drop is over
 
     def _unfold(self) -> None:
         """What was open and came back, say by an undo, is open again."""

@@ -12,12 +12,13 @@ from PySide6.QtWidgets import QHBoxLayout, QLabel, QWidget
 from studio_core.edits import Move
 from studio_core.params import ParamInfo
 from studio_core.scene.nodes import Camera, Light, NodeId, Scene
-from studio_core.scene.size import own_size, resized
+from studio_core.scene.size import own_size, pivot_words, resized
 from studio_core.scene.transform import IDENTITY, Transform, Vec3
 from studio_ui.canvas.drags import named
 from studio_ui.context import Context
 from studio_ui.euler import from_euler, to_euler
 from studio_ui.number_style import number_style
+from studio_ui.panels.panel import note
 from studio_ui.param_form import form_label_like, form_layout
 from studio_ui.reset_button import ResetButton, beside
 from studio_ui.spin import Spin
@@ -154,7 +155,10 @@ class PlaceEditor(QWidget):
         for (info, triple), reset in zip(rows, resets.values(), strict=True):
             layout.addRow(UnitLabel(info, info.doc), beside(triple, reset))
         tip = f"Width × depth × height\n{_SIZE.doc}"
+        self.pivot = note("")
+        self.pivot.setToolTip("The point that its position tells, and about which it is turned and scaled")
         layout.addRow(UnitLabel(_SIZE, tip), beside(self.size, ResetButton("size", lambda: None)))
+        layout.addRow(self.pivot)
 
     def show_nodes(self, scene: Scene, nodes: tuple[NodeId, ...]) -> None:
         """Those things as they are now."""
@@ -170,6 +174,9 @@ class PlaceEditor(QWidget):
         grows = not all(isinstance(scene[node], Camera | Light) for node in nodes)
         self._layout.setRowVisible(_SCALE_ROW, grows)
         self._layout.setRowVisible(_SIZE_ROW, bool(sizes))
+        pivot = pivot_words(scene, nodes[0]) if len(self._nodes) == 1 else ""
+        self.pivot.setText(f"Pivot {pivot}")
+        self.pivot.setVisible(bool(pivot))
         for name, button in self.resets.items():
             button.offer(any(getattr(place, name) != getattr(IDENTITY, name) for place in places))
 

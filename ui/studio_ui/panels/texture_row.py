@@ -49,7 +49,11 @@ class TextureRow(QWidget):
         column.setContentsMargins(0, 0, 0, 0)
         column.setSpacing(2)
         column.addLayout(row(self.picture, self.text, load, self.remove, stretch=1))
-        column.addWidget(self.repeat)
+        self._line = QWidget()
+        told = QLabel("Repeated")
+        told.setProperty("role", "dim")
+        self._line.setLayout(row(told, self.repeat, stretch=1))
+        column.addWidget(self._line)
 
     def show_texture(self, texture: Texture | None) -> None:
         """What lies there now."""
@@ -59,7 +63,7 @@ class TextureRow(QWidget):
                 self.picture.setPixmap(small_pixmap(texture.image))
         self._texture = texture
         self.remove.setEnabled(texture is not None)
-        self.repeat.setVisible(texture is not None)
+        self._line.setVisible(texture is not None)
         if texture is None:
             self.text.setText("No picture")
             return
