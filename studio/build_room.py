@@ -12,7 +12,8 @@ from studio_core.errors import EditError, InputError
 from studio_core.rooms import new_room
 from studio_core.scene.nodes import Camera, new_id
 from studio_core.scene.room import Room
-from studio_core.scene.room_shape import RECTANGLE, Opening, OpeningKind, Point, l_plan
+from studio_core.scene.room_plans import l_plan
+from studio_core.scene.room_shape import RECTANGLE, Opening, OpeningKind, Point
 from studio_core.scene.transform import looking
 
 _ROOM = re.compile(r"([\d.]+)x([\d.]+)x([\d.]+)(?:-([\d.]+)x([\d.]+))?")

@@ -6,7 +6,8 @@ import math
 
 from hypothesis import strategies as st
 
-from studio_core.scene.room_shape import KINDS, Opening, Point, RoomShape, l_plan, rectangle
+from studio_core.scene.room_plans import l_plan
+from studio_core.scene.room_shape import KINDS, Opening, Point, RoomShape, rectangle
 
 
 @st.composite

@@ -215,21 +215,6 @@ def rectangle(width: float, depth: float) -> tuple[Point, ...]:
     return ((-x, -z), (x, -z), (x, z), (-x, z))
 
 
-def l_plan(width: float, depth: float, cut_width: float, cut_depth: float) -> tuple[Point, ...]:
-    """A rectangle without a piece at its front right corner. Raises ValueError unless something is left."""
-    if not (0 < cut_width < width and 0 < cut_depth < depth):
-        raise ValueError("what is cut from a room must be smaller than the room")
-    x, z = width / 2, depth / 2
-    return (
-        (-x, -z),
-        (x, -z),
-        (x, z - cut_depth),
-        (x - cut_width, z - cut_depth),
-        (x - cut_width, z),
-        (-x, z),
-    )
-
-
 def stretched(plan: tuple[Point, ...], width: float, depth: float) -> tuple[Point, ...]:
     """A plan about the origin whose box is `width` × `depth`; ValueError when it has no extent."""
     made = np.array(plan, np.float64)

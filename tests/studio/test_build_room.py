@@ -16,7 +16,8 @@ from studio_core.errors import InputError
 from studio_core.registry import PluginHost
 from studio_core.scene.nodes import Camera, Scene
 from studio_core.scene.room import Room
-from studio_core.scene.room_shape import Opening, l_plan
+from studio_core.scene.room_plans import l_plan
+from studio_core.scene.room_shape import Opening
 from studio_plugins.brdfs import plugin as brdfs
 
 HOST = PluginHost([brdfs])

@@ -20,7 +20,8 @@ from studio_core.rooms import new_room
 from studio_core.scene.diff import Aspect, diff
 from studio_core.scene.nodes import Scene
 from studio_core.scene.room import SLOTS, Room
-from studio_core.scene.room_shape import Opening, l_plan
+from studio_core.scene.room_plans import l_plan
+from studio_core.scene.room_shape import Opening
 from studio_core.scene.transform import Transform
 
 WINDOW = Opening(width=1.5)

@@ -15,7 +15,8 @@ from studio_core.rooms import new_room
 from studio_core.scene.geometry import Geometry
 from studio_core.scene.nodes import MeshObject, Scene
 from studio_core.scene.room import Room
-from studio_core.scene.room_shape import Opening, l_plan
+from studio_core.scene.room_plans import l_cut, l_plan
+from studio_core.scene.room_shape import Opening
 from studio_core.scene.transform import Transform, axis_angle, looking
 from studio_core.session import View
 from studio_ui.rooms import ROUND, is_above, room_around, walls_before
@@ -288,3 +289,45 @@ def test_a_drag_on_the_walls_of_a_chosen_room_looks_around(driver: Driver) -> No
     assert the_room(driver, node).transform == place
     assert len(driver.labels()) == steps
     assert driver.session.view != before
+
+
+def test_a_room_becomes_an_l_and_a_rectangle_again(driver: Driver) -> None:
+    door = Opening(kind="door", wall=3, sill=0.0, width=0.9, height=2.05)
+    node, form = with_room(driver, openings=(WINDOW, door), without=(2,))
+    plan = form.plan
+    assert plan.shape.currentText() == "Rectangle"
+    assert not plan.cut.isVisibleTo(form)
+
+    def choose(text: str) -> None:
+        index = plan.shape.findText(text)
+        plan.shape.setCurrentIndex(index)
+        plan.shape.activated.emit(index)
+        followed(driver, form)
+
+    choose("L, open front right")
+    assert the_room(driver).plan == l_plan(5, 4, 2.0, 1.6)
+    assert [one.wall for one in the_room(driver).openings] == [0, 5]
+    assert the_room(driver).without == (4,)
+    assert driver.labels()[-1] == "Floor plan of Room"
+    assert len(form.walls) == 6
+    width = plan.cut.fields["width"].spin
+    steps = len(driver.labels())
+    width.hold()
+    for _ in range(5):
+        width.step(1, Qt.KeyboardModifier.NoModifier)
+    width.let_go_now()
+    assert len(driver.labels()) == steps + 1
+    followed(driver, form)
+    cut = l_cut(the_room(driver).shape.corners)
+    assert cut is not None
+    assert cut.width > 2.0
+    assert cut.depth == pytest.approx(1.6)
+    choose("L, open back left")
+    assert l_cut(the_room(driver).shape.corners).corner == "back left"  # type: ignore[union-attr]
+    choose("Rectangle")
+    assert the_room(driver).plan == ()
+    assert the_room(driver, node).openings == (WINDOW, door)
+    assert the_room(driver).without == (2,)
+    driver.document.apply(SetFields(node, {"plan": ((0.0, -3.0), (3.0, 2.0), (-3.0, 3.0)), "openings": ()}))
+    followed(driver, form)
+    assert plan.shape.currentIndex() == -1

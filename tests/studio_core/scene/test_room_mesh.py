@@ -16,12 +16,12 @@ from studio_core.scene.geometry import Geometry
 from studio_core.scene.polygon import area
 from studio_core.scene.room_cells import CEILING, FLOOR, FRAMES, SKIRTING, WALLS
 from studio_core.scene.room_mesh import room_geometry
+from studio_core.scene.room_plans import l_plan
 from studio_core.scene.room_shape import (
     PROUD,
     SLAB,
     Opening,
     RoomShape,
-    l_plan,
     rectangle,
 )
 from studio_core.scene.shading_mesh import prepare, shade_mesh

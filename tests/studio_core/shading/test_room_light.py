@@ -16,7 +16,8 @@ from studio_core.scene.diff import Changes, diff
 from studio_core.scene.geometry import Image
 from studio_core.scene.nodes import Environment, PointLamp, Scene
 from studio_core.scene.room import Room
-from studio_core.scene.room_shape import Opening, Point, l_plan
+from studio_core.scene.room_plans import l_plan
+from studio_core.scene.room_shape import Opening, Point
 from studio_core.scene.transform import Transform, axis_angle
 from studio_core.shading.frame import Frame
 from studio_core.shading.job import Job

@@ -1,4 +1,4 @@
-"""Walls and openings of a room: which walls stand, and the windows, doors and passages in them."""
+"""A room in the properties panel: floor plan, which walls stand, windows, doors and passages in them."""
 
 from __future__ import annotations
 
@@ -25,6 +25,7 @@ from studio_ui.editing import Editing
 from studio_ui.fields import Combo
 from studio_ui.number_style import NumberStyle, number_style
 from studio_ui.panels.panel import heading, note, row
+from studio_ui.panels.room_plan import PlanForm
 from studio_ui.param_form import ParamForm, form_label, form_layout
 from studio_ui.sinks import EditSink
 from studio_ui.theme import GAP
@@ -57,6 +58,8 @@ class RoomForm(QWidget):
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)
         column.setSpacing(GAP)
+        self.plan = PlanForm(editing)
+        column.addWidget(self.plan)
         column.addWidget(heading("Walls"))
         self._grid = QGridLayout()
         self._grid.setContentsMargins(0, 0, 0, 0)
@@ -106,6 +109,7 @@ class RoomForm(QWidget):
     def show_room(self, room: Room) -> None:
         """What the room is now."""
         before, self._room = self._room, room
+        self.plan.show_room(room)
         if before is None or before.walls != room.walls:
             self._make_walls(room)
         for wall, box in enumerate(self.walls):
