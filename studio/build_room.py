@@ -13,7 +13,7 @@ from studio_core.rooms import new_room
 from studio_core.scene.nodes import Camera, new_id
 from studio_core.scene.room import Room
 from studio_core.scene.room_plans import l_plan
-from studio_core.scene.room_shape import RECTANGLE, Opening, OpeningKind, Point
+from studio_core.scene.room_shape import Opening, OpeningKind, Point, rectangle, wall_names
 from studio_core.scene.transform import looking
 
 _ROOM = re.compile(r"([\d.]+)x([\d.]+)x([\d.]+)(?:-([\d.]+)x([\d.]+))?")
@@ -33,7 +33,8 @@ def room_from(options: argparse.Namespace) -> Add | None:
     if options.floor is not None:
         raise InputError("--floor: a room has a floor of its own")
     width, depth, height, plan = _sizes(options.room)
-    walls = [f"wall{number + 1}" for number in range(len(plan))] or [name.lower() for name in RECTANGLE]
+    names = wall_names(plan or rectangle(width, depth))
+    walls = [name.lower().replace(" ", "") for name in names]
     openings = [
         *(_opening("--window", text, "window", walls) for text in options.window),
         *(_opening("--door", text, "door", walls) for text in options.door),

@@ -10,13 +10,13 @@ from studio_core.scene.nodes import MeshObject
 from studio_core.scene.room_mesh import room_geometry
 from studio_core.scene.room_shape import (
     FARTHEST,
-    RECTANGLE,
     Opening,
     Placed,
     Point,
     RoomShape,
     rectangle,
     stretched,
+    wall_names,
 )
 
 SLOTS = ("Floor", "Walls", "Ceiling", "Skirting", "Frames")
@@ -74,8 +74,8 @@ class Room(MeshObject):
 
     @property
     def walls(self) -> tuple[str, ...]:
-        """What the walls are called, by index."""
-        return tuple(f"Wall {wall + 1}" for wall in range(len(self.plan))) if self.plan else RECTANGLE
+        """What the walls are called, by index: after where they are, numbered where several look that way."""
+        return wall_names(self.shape.corners)
 
     def placed(self) -> tuple[Placed, ...]:
         """The openings that found room, as they are made."""

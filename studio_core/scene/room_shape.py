@@ -9,6 +9,7 @@ from inside.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal, get_args
 
@@ -21,7 +22,6 @@ from studio_core.scene.polygon import area, clearance
 Point = tuple[float, float]
 OpeningKind = Literal["window", "door", "opening"]
 KINDS: tuple[str, ...] = get_args(OpeningKind)
-RECTANGLE = ("Back", "Right", "Front", "Left")
 MOST_WALLS, MOST_OPENINGS = 64, 100
 FARTHEST = 300.0  # metres: a hall
 SLAB = 0.1  # metres: floor and ceiling
@@ -207,6 +207,18 @@ def span(plan: F64, rims: list[F64], wall: int) -> tuple[float, float]:
     first = max(float((rim[wall] - plan[wall]) @ way) for rim in rims)
     last = min(float((rim[after] - plan[wall]) @ way) for rim in rims)
     return first, last
+
+
+def wall_names(corners: Sequence[Point]) -> tuple[str, ...]:
+    """`Back`, `Right`, `Front` or `Left`, whatever a wall is most; with a number where there are several."""
+    most = [
+        ("Right" if x > 0 else "Left") if abs(x) > abs(z) else ("Front" if z > 0 else "Back")
+        for x, z in outward(np.array(corners, np.float64))
+    ]
+    return tuple(
+        f"{name} {most[: wall + 1].count(name)}" if most.count(name) > 1 else name
+        for wall, name in enumerate(most)
+    )
 
 
 def rectangle(width: float, depth: float) -> tuple[Point, ...]:

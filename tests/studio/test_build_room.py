@@ -62,7 +62,7 @@ def test_a_room_with_everything() -> None:
 
 
 def test_an_l_shaped_room() -> None:
-    room = room_of(made("--room", "6x5x2.6-2x1.5", "--window", "wall6:1x1"))
+    room = room_of(made("--room", "6x5x2.6-2x1.5", "--window", "LEFT:1x1"))
     assert room.plan == l_plan(6, 5, 2, 1.5)
     assert room.openings[0].wall == 5
 

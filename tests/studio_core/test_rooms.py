@@ -151,10 +151,12 @@ def test_a_plan_in_metres_gives_the_sizes() -> None:
     (room,) = new_room(plan=l_plan(6, 5, 2, 1.5)).nodes
     assert isinstance(room, Room)
     assert (room.width, room.depth) == (6, 5)
-    assert room.walls == tuple(f"Wall {k}" for k in range(1, 7))
+    assert room.walls == ("Back", "Right 1", "Front 1", "Right 2", "Front 2", "Left")
     wider = dataclasses.replace(room, width=9.0)
     assert wider.geometry.bounds[1, 0] == pytest.approx(4.7)
-    assert [node.walls[0] for node in new_room().nodes if isinstance(node, Room)] == ["Back"]
+    assert [node.walls for node in new_room().nodes if isinstance(node, Room)] == [
+        ("Back", "Right", "Front", "Left")
+    ]
 
 
 def test_a_room_and_its_history_come_back_from_a_file_to_the_bit(tmp_path: Path) -> None:

@@ -157,9 +157,9 @@ def test_walls_have_check_boxes(driver: Driver) -> None:
     assert the_room(driver).without == ()
     driver.document.apply(SetFields(node, {"plan": l_plan(6, 5, 2, 1)}))
     followed(driver, form)
-    assert [box.text() for box in form.walls] == [f"Wall {k}" for k in range(1, 7)]
-    form.walls[5].click()
-    assert driver.labels()[-1] == "Open wall 6 of Room"
+    assert [box.text() for box in form.walls] == ["Back", "Right 1", "Front 1", "Right 2", "Front 2", "Left"]
+    form.walls[4].click()
+    assert driver.labels()[-1] == "Open front 2 wall of Room"
 
 
 def test_windows_are_added_changed_and_removed(driver: Driver) -> None:
@@ -304,7 +304,7 @@ def test_a_room_becomes_an_l_and_a_rectangle_again(driver: Driver) -> None:
         plan.shape.activated.emit(index)
         followed(driver, form)
 
-    choose("L, open front right")
+    choose("L without front right")
     assert the_room(driver).plan == l_plan(5, 4, 2.0, 1.6)
     assert [one.wall for one in the_room(driver).openings] == [0, 5]
     assert the_room(driver).without == (4,)
@@ -322,7 +322,7 @@ def test_a_room_becomes_an_l_and_a_rectangle_again(driver: Driver) -> None:
     assert cut is not None
     assert cut.width > 2.0
     assert cut.depth == pytest.approx(1.6)
-    choose("L, open back left")
+    choose("L without back left")
     assert l_cut(the_room(driver).shape.corners).corner == "back left"  # type: ignore[union-attr]
     choose("Rectangle")
     assert the_room(driver).plan == ()

@@ -226,8 +226,8 @@ class RoomForm(QWidget):
         if self._room is None:
             return
         without = {*self._room.without} - {wall} if there else {*self._room.without, wall}
-        name = self._room.walls[wall].lower() + ("" if self._room.plan else " wall")
-        label = f"{'Close' if there else 'Open'} {name} of {self._room.name}"
+        name = self._room.walls[wall].lower()
+        label = f"{'Close' if there else 'Open'} {name} wall of {self._room.name}"
         self._editing.apply(SetFields(self._room.id, {"without": tuple(sorted(without))}, label))
 
     def _replace(self, name: str, value: Value) -> None:

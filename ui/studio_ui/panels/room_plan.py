@@ -48,7 +48,7 @@ class PlanForm(QWidget):
         self.shape.setPlaceholderText("Another one")
         self.shape.addItem("Rectangle", "")
         for corner in CORNERS:
-            self.shape.addItem(f"L, open {corner}", corner)
+            self.shape.addItem(f"L without {corner}", corner)
         self.shape.activated.connect(lambda _: self._choose(self.shape.currentData()))
         layout.addRow(form_label("Floor plan", _TIP), self.shape)
         column.addWidget(top)
