@@ -30,6 +30,7 @@ def run_program(arguments: Sequence[str], job: Job, heard: Heard) -> dict[str, A
 
     Raises Cancelled when the job was cancelled, InputError with what it complained of.
     """
+    label = job.label
     paths = os.pathsep.join(path for path in sys.path if path)
     more: dict[str, Any] = {"start_new_session": True}
     if sys.platform == "win32":
@@ -64,7 +65,7 @@ def run_program(arguments: Sequence[str], job: Job, heard: Heard) -> dict[str, A
                 said = line.strip() or said
                 continue
             if "done" in told:
-                job.label = str(told.get("label", job.label))
+                job.label = _labelled(label, str(told.get("label", "")))
                 with contextlib.suppress(Cancelled):  # the watcher stops the child
                     job.checkpoint(int(told["done"]), int(told["total"]))
             heard(told)
@@ -93,6 +94,11 @@ def _watch(child: subprocess.Popen[str], job: Job, over: threading.Event) -> Non
             if not over.wait(PATIENCE):
                 child.kill()
             return
+
+
+def _labelled(label: str, step: str) -> str:
+    """What is done, and which of several pictures it is at."""
+    return f"{label}: {step[0].lower()}{step[1:]}" if " of " in step else label
 
 
 def _parsed(line: str) -> dict[str, Any] | None:
