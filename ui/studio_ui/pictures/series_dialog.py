@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from PySide6.QtCore import Qt
+from PySide6.QtGui import QImage
 from PySide6.QtWidgets import (
     QAbstractItemView,
     QCheckBox,
@@ -116,11 +117,13 @@ class SeriesDialog(PictureDialog):
         self.form_column.addStretch(1)
         self.resize(980, 720)
         self.kind.currentIndexChanged.connect(self._kind)
+        self.camera.currentIndexChanged.connect(lambda _: self._changed())
         self.count.valueChanged.connect(lambda _: self._times())
         self.rate.valueChanged.connect(lambda _: self._times())
         self.length.valueChanged.connect(self._length)
         for signal in (self.size_form.changed, self.look_form.changed, self.path_list.itemChanged):
             signal.connect(lambda *_: self._changed())
+        self.resume.toggled.connect(lambda _: self._name_files())
         for edit in (self.folder, self.name):
             edit.textChanged.connect(lambda _: self._changed())
 
@@ -193,20 +196,29 @@ class SeriesDialog(PictureDialog):
         self.count.show_value(max(1, round(seconds * self.rate.value())))
         self._changed()
 
+    def finished_well(self, text: str) -> None:
+        """What is there now is said, too."""
+        super().finished_well(text)
+        self._name_files()
+
+    def _name_files(self) -> None:
+        path = self._path(Path(self.folder.text().strip()))
+        first = path.with_name(f"{path.stem}_0001{path.suffix}")
+        known = ""
+        if first.expanduser().exists():
+            fate = "kept" if self.resume.isChecked() else "replaced"
+            known = f" Pictures of that name are there and will be {fate}."
+        self.files_told.setText(f"{first.name} … {path.stem}_{self._count():04}{path.suffix}.{known}")
+
     def _changed(self) -> None:
         if self.task is not None:
             return
-        path = self._path(Path(self.folder.text().strip()))
-        first = path.with_name(f"{path.stem}_0001{path.suffix}")
-        there = first.expanduser().exists()
-        known = "Pictures of that name are there." if there else ""
-        self.files_told.setText(
-            f"{first.name} … {path.stem}_{self._count():04}{path.suffix}. {known}".strip()
-        )
+        self._name_files()
         few = self.kind.currentData() == "path" and len(self._cameras()) < 2
         self.export_button.setEnabled(not few)
-        if self.camera.currentData() == HERE:
-            self.preview.show_image(self._owner.framed(self.size_form.size_()))
+        here = self.kind.currentData() != "path" and self.camera.currentData() == HERE
+        image = self._owner.framed(self.size_form.size_()) if here else QImage()
+        self.preview.show_image(image, "Small pictures appear here while they are made.")
         text = "A path needs two cameras or more: View ▸ New camera from view." if few else self.estimate()
         self.tell(text, "warning" if few else "dim")
 
@@ -216,6 +228,7 @@ def _camera_list(cameras: list[Camera]) -> QListWidget:
     made.setAccessibleName("Cameras of the path")
     made.setDragDropMode(QAbstractItemView.DragDropMode.InternalMove)
     made.setFixedHeight(110)
+    made.setSpacing(2)
     for camera in cameras:
         item = QListWidgetItem(camera.name)
         item.setData(Qt.ItemDataRole.UserRole, camera.id)
