@@ -122,6 +122,8 @@ class PictureDialog(QDialog):
         area.setWidgetResizable(True)
         area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         area.setWidget(self.form)
+        area.setAccessibleName("What is exported")
+        area.setFocusPolicy(Qt.FocusPolicy.NoFocus)  # the keyboard goes to the fields
         area.setFixedWidth(FORM_WIDTH + SCROLL_BAR)
         halves.addWidget(area)
         halves.addLayout(right, 1)
