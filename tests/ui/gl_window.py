@@ -64,6 +64,7 @@ class Bench:
         self.application = QApplication(["lucarne"])
         host = PluginHost((brdfs, meshes))
         self.settings = Settings(state)
+        self.settings.set("view_cube", False)  # what is compared is the canvas alone
         self.studio = assemble(
             settings=self.settings,
             host=host,

@@ -47,6 +47,7 @@ class StatusBar(QStatusBar):
     def __init__(self) -> None:
         super().__init__()
         self.setSizeGripEnabled(False)
+        self.setMinimumHeight(self.fontMetrics().height() + 14)  # no text resizes the picture
         self.message = QLabel()
         self.message.setTextFormat(self.message.textFormat().PlainText)
         self.message.setMinimumWidth(1)  # a long one widens no window
