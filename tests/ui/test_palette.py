@@ -10,6 +10,7 @@ from PySide6.QtTest import QTest
 from pytestqt.qtbot import QtBot
 from ui_support import Driver, Make, room
 
+from studio_core.scene.nodes import MeshObject
 from studio_ui.actions.catalogue import specs
 from studio_ui.fuzzy import folded, match
 from studio_ui.palette import Entry, search
@@ -118,6 +119,32 @@ def test_cameras_panels_and_themes_are_found(driver: Driver) -> None:
     palette.edit.setText("outliner")
     assert palette.found[0].checked, "the panel is shown"
     palette.close()
+
+
+def test_things_and_materials_of_the_scene_are_found(driver: Driver) -> None:
+    palette = driver.window.palette_
+    type_in(driver, "stool")
+    assert palette.found[0].place == "Choose ▸ Object"
+    QTest.keyClick(palette.edit, Qt.Key.Key_Return)
+    assert driver.session.selection == ("stool",)
+    driver.do("help.palette")
+    assert not palette.found[0].name.startswith("choose."), "commands are remembered, things are not"
+    palette.edit.setText("red assign")
+    assert palette.found[0].name == "assign.red"
+    QTest.keyClick(palette.edit, Qt.Key.Key_Return)
+    stool = driver.document.scene["stool"]
+    assert isinstance(stool, MeshObject)
+    assert stool.materials == ("red",)
+    driver.session.select([])
+    driver.do("help.palette")
+    palette.edit.setText("red assign")
+    assert palette.found[0].reason == "No object is chosen"
+    palette.close()
+
+
+def test_commands_come_before_things_of_the_same_name() -> None:
+    thing = entry("Save", "Choose ▸ Object", rank=-6.0)
+    assert search([thing, entry("Save")], "save")[0][0].place == "Edit"
 
 
 def test_keys_walk_through_the_list(driver: Driver) -> None:

@@ -44,6 +44,16 @@ def test_quality_is_one_thing_in_both_places(driver: Driver) -> None:
     assert bar.slider.value() == 0
 
 
+def test_projects_that_say_nothing_begin_with_the_preferred_quality(driver: Driver) -> None:
+    driver.window.preferences.set("quality", 0.8)
+    assert "quality" not in driver.session.params, "not for what is open"
+    driver.window.files.new()
+    assert driver.session.params["quality"] == 0.8
+    driver.session.shade_with("cuts", {"quality": 0.3})
+    driver.context.warmed.emit()
+    assert driver.session.params["quality"] == 0.3
+
+
 def test_a_drag_of_quality_is_told_once_at_its_end(driver: Driver) -> None:
     slider = driver.window.quality.slider
     slider.setSliderDown(True)

@@ -42,6 +42,7 @@ from studio_ui.layouts import Layouts
 from studio_ui.magnet import Magnet
 from studio_ui.menus import Menus
 from studio_ui.palette import Palette, menu_entries
+from studio_ui.palette_scene import scene_entries
 from studio_ui.panels.all import all_panels
 from studio_ui.panels.console import ConsoleDoor
 from studio_ui.panels.panel import Panel, stacked
@@ -165,7 +166,11 @@ class MainWindow(QMainWindow):
         self.palette_ = Palette(
             self,
             settings,
-            [lambda: menu_entries(self.menuBar(), self.actions_.reasons()), chosen.entries],
+            [
+                lambda: menu_entries(self.menuBar(), self.actions_.reasons()),
+                chosen.entries,
+                lambda: scene_entries(context),
+            ],
         )
         return [
             self,

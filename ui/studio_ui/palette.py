@@ -26,7 +26,10 @@ _KEYS = {Qt.Key.Key_Down: 1, Qt.Key.Key_Up: -1, Qt.Key.Key_PageDown: _ROWS - 1, 
 
 @dataclass(frozen=True)
 class Entry:
-    """One command: `place` is its menu, `reason` says why it cannot be run now (empty when it can)."""
+    """One command: `place` is its menu, `reason` says why it cannot be run now (empty when it can).
+
+    `rank` is added to how well it fits; `kept` tells whether it is remembered among those used lately.
+    """
 
     name: str
     title: str
@@ -36,6 +39,8 @@ class Entry:
     reason: str = ""
     hint: str = ""
     checked: bool = False
+    rank: float = 0.0
+    kept: bool = True
 
     @property
     def spoken(self) -> str:
@@ -105,7 +110,7 @@ def search(entries: Sequence[Entry], query: str, recent: Sequence[str] = ()) -> 
             score = -10.0
         if hit is None:
             continue
-        score += 2.0 * (entry.name in rank) - 3.0 * bool(entry.reason)
+        score += entry.rank + 2.0 * (entry.name in rank) - 3.0 * bool(entry.reason)
         found.append((score, (entry, tuple(i for i in hit.at if i < len(entry.title)))))
     found.sort(key=lambda pair: -pair[0])
     return [pair for _, pair in found]
@@ -233,6 +238,7 @@ class Palette(QFrame):
         if entry.reason:
             return
         self.close()
-        before = [name for name in self._settings.get(_KEPT, []) if isinstance(name, str)]
-        self._settings.set(_KEPT, list(dict.fromkeys([entry.name, *before]))[:RECENT])
+        if entry.kept:
+            before = [name for name in self._settings.get(_KEPT, []) if isinstance(name, str)]
+            self._settings.set(_KEPT, list(dict.fromkeys([entry.name, *before]))[:RECENT])
         entry.run()
