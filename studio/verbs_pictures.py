@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from studio import verbs
 from studio.headless import Headless
@@ -20,11 +20,15 @@ from studio_core.scene.nodes import Camera, Light, MeshObject, Scene
 from studio_core.scene.transform import Vec3
 from studio_core.session import View
 
+if TYPE_CHECKING:
+    from studio_core.imaging.preview import ContactSheet
+
 PICTURES = (".png", ".exr")
 MOST_PIXELS = 16384
 MOST_EXPOSURE = 64.0
 MOST_FRAMES = 10_000
-SAMPLE_BYTES = 96  # of a sample while it is made, seen and shaded
+PROGRAM_BYTES = 6e8  # with a scene of ordinary size
+SAMPLE_BYTES = 150  # of a sample while it is made, seen and shaded
 ROW_BYTES = 256  # of a pixel in a row of bands
 SHOW_EVERY = 0.3  # seconds between two previews
 
@@ -71,7 +75,7 @@ def _memory_needed(width: int, height: int, antialias: int) -> float:
     from studio_core.shading.bands import GUIDE_SAMPLES
 
     samples = min(width * height * antialias**2, GUIDE_SAMPLES)
-    return SAMPLE_BYTES * samples + 2 * width * (ROW_BYTES + SAMPLE_BYTES * antialias**2)
+    return PROGRAM_BYTES + SAMPLE_BYTES * samples + 2 * width * (ROW_BYTES + SAMPLE_BYTES * antialias**2)
 
 
 def memory() -> float:
@@ -144,7 +148,11 @@ def render(options: argparse.Namespace, program: Headless) -> None:
     parts = Parts(transparent=options.alpha, lights=options.lights)
     preview = None if options.preview is None else _Preview(options.preview, size, finish)
     with program.job("Rendering") as job:
-        given = {"places": options.measure or 0, "facts": _facts(options, scene), "watch": preview}
+        given: dict[str, Any] = {
+            "places": options.measure or 0,
+            "facts": _facts(options, scene),
+            "watch": preview,
+        }
         made = write_view(maker, scene, view, options.out, finish, job, parts=parts, **given)
         if preview is not None:
             preview.write()
@@ -199,7 +207,7 @@ def frames(options: argparse.Namespace, program: Headless) -> None:
     for path in paths:
         verbs.check_target(path)
     sheet = ContactSheet(count, size)
-    there = {i: found for i, path in enumerate(paths) if options.resume and (found := _kept(path, size))}
+    there = _kept(paths, size, sheet) if options.resume else set()
     maker = PictureMaker(backend, params, program.services)
     facts, parts = _facts(options, scene), Parts(transparent=options.alpha, lights=options.lights)
     finite, shown, started = True, 0.0, time.perf_counter()
@@ -209,12 +217,15 @@ def frames(options: argparse.Namespace, program: Headless) -> None:
             part = JobPart(job, index / count, (index + 1) / count, f"Frame {index + 1} of {count}")
             part.at(0)
             if index in there:
-                if sheet.has(index):
-                    sheet.put(index, _small(path, sheet.cell))
                 continue
             small = _Preview(None, size, finish, max(sheet.cell))
             told = {**facts, "lucarne:frame": f"{index + 1} of {count}"}
-            given = {"parts": parts, "places": options.measure or 0, "facts": told, "watch": small}
+            given: dict[str, Any] = {
+                "parts": parts,
+                "places": options.measure or 0,
+                "facts": told,
+                "watch": small,
+            }
             made = write_view(maker, shot.scene, shot.view, path, finish, part, **given)
             finite &= made.finite
             if made.error is not None:
@@ -302,23 +313,21 @@ def frame_path(out: Path, number: int, count: int) -> Path:
     return out.with_name(f"{out.stem}_{number:0{digits}}{out.suffix}")
 
 
-def _kept(path: Path, size: tuple[int, int]) -> bool:
-    """Whether a frame of that size is there: files are whole or not there."""
-    from studio_core.imaging.io import ImageDecoder
-
-    if not path.is_file():
-        return False
-    with suppress(InputError), ImageDecoder() as decoder:
-        height, width = decoder.read(path).pixels.shape[:2]
-        return (width, height) == size
-    return False
-
-
-def _small(path: Path, cell: tuple[int, int]) -> Any:
+def _kept(paths: Sequence[Path], size: tuple[int, int], sheet: ContactSheet) -> set[int]:
+    """Which frames of that size are there, put on the sheet: files are whole or not there."""
     from studio_core.imaging.io import ImageDecoder
     from studio_core.imaging.resample import resize_area
     from studio_core.kernels.tonemap import tonemap
 
+    found = set()
     with ImageDecoder() as decoder:
-        pixels = resize_area(decoder.read(path).pixels, *cell)[:, :, :3]
-    return pixels if pixels.dtype.kind == "u" else tonemap(pixels)
+        for index, path in enumerate(paths):
+            with suppress(InputError):
+                pixels = decoder.read(path).pixels
+                if pixels.shape[1::-1] != size:
+                    continue
+                found.add(index)
+                if sheet.has(index):
+                    small = resize_area(pixels, *sheet.cell)[:, :, :3]
+                    sheet.put(index, small if small.dtype.kind == "u" else tonemap(small))
+    return found

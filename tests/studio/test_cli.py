@@ -237,7 +237,7 @@ def test_a_picture_larger_than_the_memory_is_refused(
     files: Path, run: Run, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(studio.verbs_pictures, "memory", lambda: 5e8)
-    refused(run(*RENDER, "--size", "16384x16384"), "--size 16384x16384", "0.8 GB", "0.5 GB")
+    refused(run(*RENDER, "--size", "16384x16384"), "--size 16384x16384", "1.9 GB", "0.5 GB")
 
 
 @pytest.mark.skipif(not Path("/proc/self").is_dir(), reason="needs a folder that takes no file")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -187,7 +188,8 @@ def guessed(look: Look, past: Mapping[str, Any], kind: str = "one") -> float | N
         return None
     try:
         samples = _samples(look)
-        shading = float(found["shading"]) * (min(samples, GUIDE_SAMPLES) / float(found["guide"])) ** 0.5
+        share = min(samples, GUIDE_SAMPLES) / float(found["guide"])
+        shading = float(found["shading"]) * math.sqrt(share)
         return START_SECONDS + shading + float(found["composing"]) * samples / float(found["samples"])
     except (KeyError, TypeError, ValueError, ZeroDivisionError):
         return None
