@@ -35,6 +35,8 @@ def match(query: str, text: str) -> Match | None:
 
 def folded(text: str) -> str:
     """Small letters without accents, as many as before."""
+    if text.isascii():
+        return text.lower()
     return "".join(unicodedata.normalize("NFD", letter)[0].casefold()[:1] or letter for letter in text)
 
 
@@ -43,6 +45,11 @@ def _word(word: str, text: str) -> Match | None:
 
     `best[i]` is the best score of the letters so far with the last one at position i, and where they are.
     """
+    at = -1
+    for letter in word:  # most texts are out of the question
+        at = text.find(letter, at + 1)
+        if at < 0:
+            return None
     best: dict[int, tuple[float, tuple[int, ...]]] = {}
     for number, letter in enumerate(word):
         now: dict[int, tuple[float, tuple[int, ...]]] = {}
