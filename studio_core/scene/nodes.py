@@ -9,6 +9,7 @@ import dataclasses
 import secrets
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import TypeVar
 
 from studio_core.arrays import frozen_map
@@ -215,7 +216,7 @@ class Scene:
 
     def children(self, parent: NodeId | None) -> Iterator[Node]:
         """The nodes directly under `parent` (None: the top), in order."""
-        return (node for node in self.nodes.values() if node.parent == parent)
+        return (self.nodes[node] for node in self._below.get(parent, ()))
 
     def ancestors(self, node: NodeId) -> Iterator[Node]:
         """The parents of a node from the nearest up."""
@@ -227,13 +228,18 @@ class Scene:
 
     def subtree(self, node: NodeId) -> list[NodeId]:
         """The node and everything under it."""
-        below: dict[NodeId | None, list[NodeId]] = {}
-        for child in self.nodes.values():
-            below.setdefault(child.parent, []).append(child.id)
         found = [self[node].id]
         for parent in found:
-            found.extend(below.get(parent, ()))
+            found.extend(self._below.get(parent, ()))
         return found
+
+    @cached_property
+    def _below(self) -> Mapping[NodeId | None, list[NodeId]]:
+        """Children by parent: of thousands of nodes, all are looked at once for a scene."""
+        made: dict[NodeId | None, list[NodeId]] = {}
+        for child in self.nodes.values():
+            made.setdefault(child.parent, []).append(child.id)
+        return made
 
     def world(self, node: NodeId) -> Transform:
         """World from the node's own frame."""

@@ -297,3 +297,13 @@ def test_what_was_dropped_into_a_closed_group_is_in_sight(driver: Driver) -> Non
     panel.tree.setState(panel.tree.State.NoState)
     driver.until(lambda: panel.tree.isExpanded(panel.index_of("chair")))
     assert panel.tree.currentIndex() == panel.index_of("stool")
+
+
+def test_a_choice_of_many_rows_is_a_few_ranges(driver: Driver) -> None:
+    driver.document.apply(Add(tuple(crowd(300).nodes.values())))
+    panel = driver.window.panels["outliner"]
+    chosen = [n for n in crowd(300).nodes if n not in ("c7", "g3")]
+    driver.session.select(chosen)
+    ranges = panel.tree.selectionModel().selection()
+    assert ranges.size() <= 10
+    assert {panel.model.node(panel.proxy.mapToSource(i)) for i in ranges.indexes()} == set(chosen)

@@ -2,9 +2,18 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterable, Mapping
 
-from PySide6.QtCore import QItemSelection, QItemSelectionModel, QModelIndex, QPoint, Qt, QTimer
+from PySide6.QtCore import (
+    QItemSelection,
+    QItemSelectionModel,
+    QItemSelectionRange,
+    QModelIndex,
+    QPoint,
+    Qt,
+    QTimer,
+)
 from PySide6.QtGui import QAction, QShowEvent
 from PySide6.QtWidgets import QLineEdit, QMenu
 
@@ -151,12 +160,9 @@ class OutlinerPanel(Panel):
         self.context.session.select(n for n in nodes if n is not None)
 
     def _selected(self) -> None:
-        selection, last = QItemSelection(), QModelIndex()
-        for node in self.context.session.selection:
-            index = self.index_of(node)
-            if index.isValid():
-                selection.select(index, index)
-                last = index
+        found = [self.index_of(node) for node in self.context.session.selection]
+        found = [index for index in found if index.isValid()]
+        selection, last = _selection(found), found[-1] if found else QModelIndex()
         flags = QItemSelectionModel.SelectionFlag
         model = self.tree.selectionModel()
         self._following = True
@@ -229,6 +235,23 @@ class OutlinerPanel(Panel):
             made.addSeparator()
             made.addActions([self._actions[name] for name in names if name in self._actions])
         return made
+
+
+def _selection(indices: list[QModelIndex]) -> QItemSelection:
+    """One range for rows that follow each other: Qt is slow with thousands of ranges."""
+    made = QItemSelection()
+    rows: dict[tuple[int, int], list[QModelIndex]] = {}
+    for index in indices:
+        above = index.parent()
+        rows.setdefault((above.internalId(), above.row()), []).append(index)
+    for siblings in rows.values():
+        siblings.sort(key=QModelIndex.row)
+        start = siblings[0]
+        for one, other in itertools.zip_longest(siblings, siblings[1:]):
+            if other is None or other.row() != one.row() + 1:
+                made.append(QItemSelectionRange(start, one))
+                start = other
+    return made
 
 
 def _set_all(nodes: Iterable[NodeId], field: str, value: bool, label: str) -> Edit:
