@@ -33,6 +33,7 @@ class Viewing:
             "view.frame_selection": self.frame_selection,
             "view.frame_all": self.frame_all,
             "view.home": self.home,
+            "view.walk": self.walk,
             "view.brighter": lambda: self.expose(0.5),
             "view.darker": lambda: self.expose(-0.5),
             "view.invert_wheel": lambda: self.invert_wheel(not self._looking.inverted),
@@ -45,6 +46,7 @@ class Viewing:
     def conditions(self) -> dict[str, Callable[[], bool]]:
         """By name."""
         made: dict[str, Callable[[], bool]] = {
+            "walk": lambda: self._looking.walking.active,
             "invert_wheel": lambda: self._looking.inverted,
             "animate": lambda: self._looking.flight.animated,
         }
@@ -73,6 +75,16 @@ class Viewing:
         if found is not None:
             view = framing(found[0], found[1], self._context.session.view)
             self._looking.flight.to(navigation.frame(view, *found))
+
+    def walk(self) -> None:
+        """Start walking with keys, or stop."""
+        walking = self._looking.walking
+        if walking.active:
+            walking.stop()
+        else:
+            self._looking.flight.stop()
+            walking.start()
+            self._context.journal.write("W A S D walk, E and Q go up and down, Shift hurries; Esc ends it")
 
     def look_from(self, way: npt.ArrayLike) -> None:
         """From a side, an edge or a corner of the world, about what is chosen or looked at."""

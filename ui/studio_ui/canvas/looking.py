@@ -16,6 +16,7 @@ from studio_ui.canvas.flight import Flight
 from studio_ui.canvas.presets import LUCARNE, Preset
 from studio_ui.canvas.projection import bounds, project
 from studio_ui.canvas.viewport import Pointer, Viewport
+from studio_ui.canvas.walking import Walking
 from studio_ui.feed import PictureFeed
 
 F64 = npt.NDArray[np.float64]
@@ -41,6 +42,7 @@ class Looking:
         self.cancelled: Signal[[]] = Signal()
         """A drag was taken back; the view is about to be the one before it."""
         self.flight = Flight(session, feed)
+        self.walking = Walking(session, feed)
         self._viewport, self._document, self._session, self._feed = viewport, document, session, feed
         self._pivot: F64 | None = None
         self._last: Pointer | None = None
@@ -52,12 +54,15 @@ class Looking:
     def close(self) -> None:
         """Stop listening, and moving."""
         self.flight.stop()
+        self.walking.stop()
         for off in self._off:
             off()
 
     def mode_of(self, press: Pointer) -> Mode | None:
         """What a drag with this button and these keys does to the view; None: it is the tools' own."""
         gesture = self.preset.gesture(press)
+        if self.walking.active and gesture != "light" and press.button != "middle":
+            return "turn"
         return None if gesture == "light" else gesture
 
     def turns_light(self, press: Pointer) -> bool:

@@ -61,7 +61,6 @@ class CanvasTools:
         self._mode = ""  # "", click, look, hold, band
         self._lit: Handle | None = None  # under the mouse, or pressed
         self._banding = False  # the next drag draws a band
-        self._before = session.view  # when looking around began
         self._placed: tuple[object, Frame | None] | None = None
         viewport.want_keys(self._wants)
         self._off = [
@@ -126,10 +125,8 @@ class CanvasTools:
             return True
         if self._editing.cancel_any():
             return True
-        if self._mode == "look":
-            self._mode = ""
-            self.looking.end()
-            self._session.look(self._before)
+        if self.looking.walking.active:
+            self.looking.walking.stop()
             return True
         if self._mode == "band" or self._banding:
             self._mode, self._banding = "", False
@@ -209,7 +206,7 @@ class CanvasTools:
         elif press.button == "left" and not press.alt and (self._bands() or looks is None):
             self._mode = "band"
         elif looks is not None:
-            self._mode, self._before = "look", self._session.view
+            self._mode = "look"
             self.looking.start(looks, press)
         else:
             self._mode = ""
@@ -282,12 +279,14 @@ class CanvasTools:
             self.refresh()
 
     def _wants(self, key: str) -> bool:
-        return self.holding.wants(key)
+        return self.holding.wants(key) or self.looking.walking.wants(key)
 
     def _on_key(self, key: str, pressed: bool) -> None:
-        if not pressed:
-            if key == "focus" and self.holding.keyed:
-                self.holding.commit()  # the hand has gone elsewhere
+        if key == "focus":  # the hand has gone elsewhere
+            self.looking.walking.stand()
+            if self.holding.keyed:
+                self.holding.commit()
+        if self.looking.walking.key(key, pressed) or not pressed:
             return
         if self.holding.key(key):
             self.refresh()
