@@ -14,7 +14,7 @@ from studio_core import __version__
 from studio_core.errors import InputError, LucarneError
 
 VERBS = (
-    *("demo", "new", "info", "render", "frames", "radiance", "precompute", "export"),
+    *("demo", "new", "info", "copy", "compact", "render", "frames", "radiance", "precompute", "export"),
     *("script", "bench", "stress", "doctor"),
 )
 BAD_INPUT, OUR_FAULT, INTERRUPTED, NOBODY_READS = 2, 70, 130, 141
@@ -131,6 +131,10 @@ def _run(options: argparse.Namespace) -> int:
                 from studio import verbs_pictures
 
                 return getattr(verbs_pictures, options.verb)(options, program) or 0
+            if options.verb in ("copy", "compact"):
+                from studio import verbs_project
+
+                return getattr(verbs_project, options.verb)(options, program) or 0
             if options.verb == "precompute":
                 from studio.verbs_precompute import precompute
 
@@ -220,6 +224,14 @@ def parser() -> argparse.ArgumentParser:
 
     info = verb("info", "what a project file holds")
     info.add_argument("file", type=Path, metavar="PROJECT")
+
+    copy = verb("copy", "a project's newest version alone, without its history: for clients")
+    copy.add_argument("project", type=Path, metavar="PROJECT")
+    copy.add_argument("-o", "--out", type=Path, required=True, metavar="OUT.lucarne")
+    copy.add_argument("--revision", type=int, metavar="N", help="an earlier version: see info --json")
+
+    compact = verb("compact", "drop a project's earlier versions to make it smaller")
+    compact.add_argument("project", type=Path, metavar="PROJECT")
 
     render = verb("render", "render a project to a picture")
     render.add_argument("project", type=Path, metavar="PROJECT")

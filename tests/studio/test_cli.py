@@ -404,6 +404,8 @@ def test_no_verb_without_a_window_loads_qt(files: Path) -> None:
     commands = [
         ["new", "made.lucarne", "--mesh", "box.obj", "--env", "sky.exr", "--floor", "3"],
         ["info", "made.lucarne"],
+        ["copy", "made.lucarne", "-o", "copy.lucarne"],
+        ["compact", "made.lucarne"],
         ["render", "made.lucarne", "-o", "x.png", *SMALL],
         ["frames", "made.lucarne", "--turntable", "1", "-o", "x.png", *SMALL],
         ["radiance", "made.lucarne", "-o", "x.npz", *QUICK],
