@@ -95,13 +95,14 @@ def see(scene: Scene, view: View) -> Picture:
         world = scene.world(node.id).matrix()
         low, high = (world[:3, :3] @ corner + world[:3, 3] for corner in node.geometry.bounds)
         low, high = np.minimum(low, high), np.maximum(low, high)
+        seen = _window(view, low, high)
         with np.errstate(divide="ignore"):
-            a, b = (low - eye_of(view)) / towards, (high - eye_of(view)) / towards
+            a, b = (low - eye_of(view)) / towards[seen], (high - eye_of(view)) / towards[seen]
         enter, leave = np.minimum(a, b).max(axis=-1), np.maximum(a, b).min(axis=-1)
-        hit = (enter <= leave) & (leave > 0) & (enter < nearest)
-        nearest[hit], index[hit] = enter[hit], number
+        hit = (enter <= leave) & (leave > 0) & (enter < nearest[seen])
+        nearest[seen][hit], index[seen][hit] = enter[hit], number
         material = scene.material(node.materials[0])
-        linear[hit] = material.values.get("base_color", (0.5, 0.5, 0.5))
+        linear[seen][hit] = material.values.get("base_color", (0.5, 0.5, 0.5))
     radiance: Any = SimpleNamespace(
         surfaces=SimpleNamespace(nodes=tuple(n.id for n in nodes)),
         valid=np.ones(8, bool),
@@ -110,6 +111,17 @@ def see(scene: Scene, view: View) -> Picture:
     )
     covered = (index >= 0).astype(np.float32)
     return Picture(radiance, linear, covered, index, nearest.astype(np.float32))
+
+
+def _window(view: View, low: np.ndarray, high: np.ndarray) -> tuple[slice, slice]:
+    """Rows and columns that a box can be seen in: all of them where it reaches behind the eye."""
+    flat = project(view, np.stack(np.meshgrid(*zip(low, high, strict=True)), axis=-1).reshape(-1, 3))
+    if not np.isfinite(flat).all():
+        return slice(None), slice(None)
+    size = np.array([view.width, view.height])
+    first = np.clip(np.floor(flat.min(axis=0) * size) - 1, 0, size).astype(int)
+    last = np.clip(np.ceil(flat.max(axis=0) * size) + 1, 0, size).astype(int)
+    return slice(first[1], last[1]), slice(first[0], last[0])
 
 
 class Fake:

@@ -7,8 +7,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from PySide6.QtCore import QMimeData, QPoint, QPointF, Qt, QUrl
-from PySide6.QtGui import QDragEnterEvent, QDragLeaveEvent, QDragMoveEvent, QDropEvent, QImage
+from drag_support import Drag, files, on_canvas
+from PySide6.QtCore import QMimeData, QPoint, Qt, QUrl
+from PySide6.QtGui import QImage
 from PySide6.QtWidgets import QApplication
 from ui_support import Answers, Driver, Make, block, room
 
@@ -20,43 +21,6 @@ from studio_ui.files.landing import Landing, beside, landing, placed_model
 from studio_ui.material_drag import material_data
 
 KNOWN = (".obj", ".glb")
-
-
-def files(*paths: Path) -> QMimeData:
-    data = QMimeData()
-    data.setUrls([QUrl.fromLocalFile(str(path)) for path in paths])
-    return data
-
-
-class Drag:
-    """A drag over the window, as Qt sends it."""
-
-    def __init__(self, driver: Driver, data: QMimeData, keys: Qt.KeyboardModifier | None = None) -> None:
-        self.driver, self.data = driver, data
-        self.keys = keys or Qt.KeyboardModifier.NoModifier
-
-    def _send(self, kind: type, at: QPoint) -> bool:
-        point = at if kind is not QDropEvent else QPointF(at)
-        copy, left = Qt.DropAction.CopyAction, Qt.MouseButton.LeftButton
-        event = kind(point, copy, self.data, left, self.keys)
-        event.setAccepted(False)
-        QApplication.sendEvent(self.driver.window, event)
-        return event.isAccepted()
-
-    def over(self, at: QPoint) -> bool:
-        entered = self._send(QDragEnterEvent, at)
-        return self._send(QDragMoveEvent, at) and entered
-
-    def drop(self, at: QPoint) -> bool:
-        self.over(at)
-        return self._send(QDropEvent, at)
-
-    def leave(self) -> None:
-        QApplication.sendEvent(self.driver.window, QDragLeaveEvent())
-
-
-def on_canvas(driver: Driver, point: tuple[float, float, float]) -> QPoint:
-    return driver.viewport.mapTo(driver.window, driver.at(point))
 
 
 def overlay(driver: Driver):
