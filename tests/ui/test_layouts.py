@@ -58,6 +58,18 @@ def test_panels_come_back_after_a_start_with_the_picture_alone(make: Make, tmp_p
     assert visible(make(state=tmp_path / "mine")) == before
 
 
+def test_a_panel_behind_another_comes_to_the_front_by_its_entry(driver: Driver) -> None:
+    entry = driver.window.docks["lighting"].toggleViewAction()
+    driver.until(lambda: in_front(driver, "properties"))
+    entry.trigger()
+    driver.until(lambda: in_front(driver, "lighting"))
+    assert entry.isChecked()
+    entry.trigger()
+    assert driver.window.docks["lighting"].isHidden(), "it was in front: now it goes"
+    entry.trigger()
+    driver.until(lambda: in_front(driver, "lighting"))
+
+
 def test_own_layouts_are_kept_used_and_deleted(make: Make, tmp_path: Path) -> None:
     driver = make(state=tmp_path / "mine")
     driver.window.docks["outliner"].hide()

@@ -31,6 +31,7 @@ class Layout:
         self.panels = {panel.id: panel for panel, _ in panels}
         self.docks: dict[str, QDockWidget] = {}
         self._window, self._settings = window, settings
+        self._in_front: dict[str, tuple[bool, bool]] = {}  # before the last change, and now
         for panel, area in panels:
             dock = QDockWidget(panel.title, window)
             dock.setObjectName(f"dock-{panel.id}")
@@ -38,6 +39,8 @@ class Layout:
             dock.setMinimumWidth(PANEL_WIDTH - 60)
             window.addDockWidget(area, dock)
             self.docks[panel.id] = dock
+            dock.visibilityChanged.connect(lambda seen, name=panel.id: self._seen(name, seen))
+            dock.toggleViewAction().triggered.connect(lambda shown, name=panel.id: self._toggled(name, shown))
         docks = self.docks
         for names in _TABS:
             for one, other in pairwise(names):
@@ -65,6 +68,17 @@ class Layout:
     def conditions(self) -> dict[str, Callable[[], bool]]:
         """None."""
         return {}
+
+    def _seen(self, name: str, visible: bool) -> None:
+        """A panel came to the front, or went behind another one or away."""
+        _, before = self._in_front.get(name, (False, False))
+        self._in_front[name] = (before, visible)
+
+    def _toggled(self, name: str, shown: bool) -> None:
+        """Its entry in the menu: a panel that is behind another one comes to the front instead of going."""
+        before, _ = self._in_front.get(name, (False, False))
+        if shown or not before:
+            self.show(name)
 
     def show(self, name: str) -> None:
         """Bring a panel to the front."""
