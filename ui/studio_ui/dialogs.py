@@ -157,7 +157,7 @@ class KeysDialog(QDialog):
     def __init__(self, parent: QWidget | None, keys: Sequence[tuple[str, str]]) -> None:
         super().__init__(parent)
         self.setWindowTitle("Keys and mouse")
-        self.resize(520, 560)
+        self.resize(760, 600)
         tree = QTreeWidget()
         tree.setAccessibleName("Keys and mouse")
         tree.setHeaderLabels(["What", "How"])

@@ -50,6 +50,7 @@ class ViewControls(QWidget):
         self.transform.setAccessibleName("View transform")
         self.camera.setToolTip("Look through a camera of the scene")
         self.camera.setMinimumWidth(90)
+        self.camera.setMinimumContentsLength(16)
         self.exposure = NumberField("exposure", _EXPOSURE, _Exposure(context))
         self.exposure.setMinimumWidth(130)
         self.exposure.setMaximumWidth(230)
