@@ -46,6 +46,14 @@ def test_every_condition_has_a_reason() -> None:
         assert not reason.endswith(".")
 
 
+def test_every_action_says_what_it_does() -> None:
+    """In a tooltip, the status bar and the palette: no sentence's stop, not its name again."""
+    for spec in specs():
+        assert spec.tip, spec.id
+        assert not spec.tip.endswith("."), spec.id
+        assert spec.tip.casefold() != spec.text.casefold(), spec.id
+
+
 @pytest.mark.parametrize("kind", ["handler", "condition"])
 @pytest.mark.parametrize("more", [True, False])
 def test_what_does_not_match_is_named(kind: str, more: bool, qtbot: QtBot) -> None:

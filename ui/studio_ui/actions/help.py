@@ -13,7 +13,7 @@ ITEMS: tuple[Item, ...] = (
     ActionSpec(
         "help.hints", "First steps", "Help", "", "Three things to try, above the picture", enabled="furnished"
     ),
-    ActionSpec("help.keys", "Keys and mouse", "Help", "F1"),
-    ActionSpec("help.plugins", "Plugins", "Help"),
-    ActionSpec("help.about", "About Lucarne", "Help"),
+    ActionSpec("help.keys", "Keys and mouse", "Help", "F1", "All keys, and what the mouse does"),
+    ActionSpec("help.plugins", "Plugins", "Help", "", "What is loaded, and what failed and why"),
+    ActionSpec("help.about", "About Lucarne", "Help", "", "Which version this is"),
 )

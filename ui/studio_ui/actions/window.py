@@ -7,7 +7,7 @@ ITEMS: tuple[Item, ...] = (
                "A prompt for commands in Python; once more hides it"),
     ActionSpec("window.next", "Next panel", "Window", "F6",
                "Picture, toolbar and panels in turn, without a mouse"),
-    ActionSpec("window.previous", "Previous panel", "Window", "Shift+F6"),
+    ActionSpec("window.previous", "Previous panel", "Window", "Shift+F6", "The same the other way round"),
     ActionSpec("window.furnish", "Furnish", "Window/Layouts", "", "Outliner, properties and materials"),
     ActionSpec("window.light", "Light", "Window/Layouts", "", "Environments, lamps and shading"),
     ActionSpec("window.picture_only", "Picture only", "Window/Layouts", "Tab",
