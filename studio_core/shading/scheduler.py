@@ -87,14 +87,16 @@ class ComputeThread:
                 log.exception("work on the compute thread failed")
 
 
-def _attempt(work: Callable[[], Any]) -> tuple[Any, Exception | None]:
-    """What `work` gives, or its error."""
+def _attempt(job: Job, work: Callable[[], Any]) -> tuple[Any, Exception | None]:
+    """What `work` gives, or its error; the job is over then."""
     try:
         return work(), None
     except Exception as error:
         return None, error
     except SystemExit as error:  # a plugin must not take the program down
         return None, RuntimeError(f"a stage tried to leave the program: {error}")
+    finally:
+        job.ended = True
 
 
 @dataclass(frozen=True)
@@ -197,8 +199,7 @@ class Scheduler:
         self._executor.submit(lambda: self._run(frame, changes, job))
 
     def _run(self, frame: Frame, changes: Changes, job: Job) -> None:
-        result, error = _attempt(lambda: self.pipeline.update(frame, changes, job))
-        job.ended = True
+        result, error = _attempt(job, lambda: self.pipeline.update(frame, changes, job))
         self._post(lambda: self._finish(frame, job, result, error))
 
     def _finish(self, frame: Frame, job: Job, result: Any, error: Exception | None) -> None:
@@ -233,7 +234,7 @@ class Scheduler:
         self._job = self._spare_job = job
 
         def run() -> None:
-            result, error = _attempt(lambda: step.work(frame, job))
+            result, error = _attempt(job, lambda: step.work(frame, job))
             self._post(lambda: finish(result, error))
 
         def finish(result: Any, error: Exception | None) -> None:

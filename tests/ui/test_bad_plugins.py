@@ -21,6 +21,7 @@ from ui_support import Answers, Driver, Fake, Make, room
 from studio.app import _hook, assemble, staying
 from studio_core.contract import API, Plugin
 from studio_core.registry import PluginHost
+from studio_core.shading.job import Job
 from studio_core.shading.pipeline import Pipeline
 from studio_core.shading.scheduler import ComputeThread
 from studio_core.shading.soundness import UnsoundError
@@ -376,4 +377,32 @@ def test_nobody_is_left_behind_for_being_slow(seat: Seat) -> None:
     assert not watch.bar.isVisible()
     seat.backend.stuck.set()
     driver.settle()
+    assert driver.problems() == []
+
+
+def test_every_job_ends_and_nobody_waits_for_one_that_did(
+    seat: Seat, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    driver, watch = seat.driver, seat.driver.window.backend_watch
+    watch._timer.stop()
+    jobs: list[Job] = []
+
+    class Kept(Job):
+        def __init__(self, *given: Any, **more: Any) -> None:
+            super().__init__(*given, **more)
+            jobs.append(self)
+
+    monkeypatch.setattr("studio_core.shading.scheduler.Job", Kept)
+    for _ in range(3):
+        driver.session.select(["stool"])
+        driver.do("object.right")
+        watch.look()
+    driver.settle()
+    driver.until(lambda: driver.feed.job is None)
+    assert {job.label for job in jobs} >= {"Shading", "Looking at hidden places"}
+    assert all(job.ended for job in jobs)
+    for job in jobs:
+        job.cancel()
+    for _ in range(PATIENCE + 2):
+        watch.look()
     assert driver.problems() == []

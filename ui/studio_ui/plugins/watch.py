@@ -84,7 +84,8 @@ class BackendWatch(QObject):
 
     def _left_behind(self, name: str) -> None:
         context = self._context
-        if name in context.host.names("backend") and context.host.bundled("backend", name):
+        own = name in context.host.names("backend") and context.host.bundled("backend", name)
+        if own or name == DEFAULT:
             return  # it compiles or loads; it does come back
         plugin = plugin_of(context, name)
         error = TimeoutError("it never asks whether to go on")
