@@ -64,6 +64,11 @@ def test_several_lamps_are_edited_at_once(driver: Driver) -> None:
     driver.until(lambda: intensity.spin.text() == "8")
     assert intensity.other.text() == "3 EV"
     assert MIXED in temperature.spin.text()
+    panel_on(driver, "c", "a")
+    temperature = panel.form.fields["temperature"]
+    assert temperature.spin.text() == MIXED, "the last of them has none"
+    panel_on(driver, "a", "b", "c")
+    intensity = panel.form.fields["intensity"]
     driver.do("edit.undo")
     assert [driver.document.scene[n].intensity for n in "abc"] == [2.0, 8.0, 8.0]
     driver.until(lambda: MIXED in intensity.spin.text())

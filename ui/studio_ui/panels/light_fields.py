@@ -17,7 +17,7 @@ from studio_ui.fields import Field, NumberField, Slider
 from studio_ui.panels.dial import Dial
 from studio_ui.panels.light_hints import kelvin_words, to_ev
 from studio_ui.sinks import Sink
-from studio_ui.spin import Spin
+from studio_ui.spin import MIXED, Spin
 from studio_ui.theme import GAP
 
 _EV = ParamInfo("number", "Intensity in EV", "One more is twice the light", unit="EV", low=-32, high=32)
@@ -26,6 +26,7 @@ _LENS = ParamInfo(
 )
 _SENSOR = 24.0  # mm, the height of a full-frame picture
 _WARMEST, _COLDEST = 1700.0, 12000.0
+_NONE = "none"
 _WIDTH = 76  # pixels
 
 
@@ -162,7 +163,7 @@ class KelvinField(NumberField):
     def __init__(self, name: str, info: ParamInfo, sink: Sink) -> None:
         super().__init__(name, info, sink)
         self._low, self._high = _WARMEST, _COLDEST
-        self.spin.setSpecialValueText("none")
+        self.spin.setSpecialValueText(_NONE)
         self.spin.setSingleStep(100)
         self.hint = QLabel()
         self.hint.setProperty("role", "dim")
@@ -174,12 +175,14 @@ class KelvinField(NumberField):
 
     def show_value(self, value: Any) -> None:
         """What the scene has, and what has such a colour."""
+        self.spin.setSpecialValueText(_NONE)
         super().show_value(value)
         self.hint.setText(kelvin_words(float(value)).capitalize())
 
     def show_mixed(self, value: Any) -> None:
         """A dash."""
         super().show_mixed(value)
+        self.spin.setSpecialValueText(MIXED)  # also where the last one has none
         self.hint.setText("Several")
 
 

@@ -24,7 +24,7 @@ from studio_ui.theme import Theme
 
 _ROLE = Qt.ItemDataRole.UserRole
 _LEVELS: dict[Level, str] = {"note": "Notes", "warning": "Warnings", "problem": "Problems"}
-_DETAIL = 150  # pixels
+_DETAIL = 120  # pixels
 
 
 class LogPanel(Panel):
@@ -50,6 +50,7 @@ class LogPanel(Panel):
         self.list = QListWidget()
         self.list.setAccessibleName("Log")
         self.list.setWordWrap(True)
+        self.list.setMinimumHeight(56)
         self.list.setTextElideMode(Qt.TextElideMode.ElideNone)
         self.list.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         self.fold = QToolButton()
@@ -79,6 +80,9 @@ class LogPanel(Panel):
         self.column.addWidget(self.detail)
         self.column.addLayout(row(copy, clear, self.report))
         self.list.currentItemChanged.connect(lambda *_: self._show())
+        self._keep = QTimer(self)  # the chosen line stays in sight when the list gets lower
+        self._keep.setSingleShot(True)
+        self._keep.timeout.connect(lambda: self.list.scrollToItem(self.list.currentItem()))
         self._seen = QTimer(self)
         self._seen.setSingleShot(True)
         self._seen.timeout.connect(context.journal.see)
@@ -170,6 +174,8 @@ class LogPanel(Panel):
         self.fold.setVisible(there)
         self.detail.setPlainText(entry.detail if entry is not None else "")
         self.detail.setVisible(there and open_)
+        if there and open_:
+            self._keep.start(0)
         self._count()
 
 
