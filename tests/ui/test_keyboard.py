@@ -14,10 +14,11 @@ from ui_support import Driver
 from studio_core.params import ParamInfo
 from studio_core.registry import PluginHost
 from studio_ui.console.running import StopDialog
-from studio_ui.dialogs import KeysDialog, PluginsDialog
+from studio_ui.dialogs import KeysDialog
 from studio_ui.fields import TextField
 from studio_ui.files.report import ReportDialog
 from studio_ui.keyboard import in_order
+from studio_ui.plugins.dialog import PluginsDialog
 from studio_ui.sinks import PlainSink
 
 
@@ -46,7 +47,7 @@ def test_every_control_of_the_dialogs_has_a_name(chosen: Driver) -> None:
     dialogs = [
         ReportDialog(chosen.window, "Report", "It went wrong.", "Try again.", "Traceback"),
         StopDialog(chosen.window),
-        PluginsDialog(chosen.window, host),
+        PluginsDialog(chosen.window, host, chosen.window.settings, chosen.context.tasks),
         KeysDialog(chosen.window, [("Undo", "Ctrl+Z")]),
         preferences,
     ]

@@ -22,7 +22,7 @@ class BackendBar(Bar):
     def __init__(self, context: Context) -> None:
         super().__init__("problem")
         self._context = context
-        self.use = self.button("", "The scene stays as it is", self.fall_back)
+        self.use = self.button("Use another", "The scene stays as it is", self.fall_back)
         assert self.close_button is not None
         self.close_button.clicked.connect(self.hide)
         self.hide()
