@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
@@ -77,3 +78,22 @@ def test_help_tells_of_the_habit_in_use(driver: Driver) -> None:
     assert ("Slide the view", "Middle drag") not in driver.window.viewing.mouse()
     driver.do("view.navigation_cad")
     assert ("Slide the view", "Middle drag") in driver.window.viewing.mouse()
+
+
+def test_the_page_about_looking_tells_every_way() -> None:
+    page = (Path(__file__).resolve().parents[2] / "docs" / "looking.md").read_text("utf-8")
+    rows = [
+        [cell.strip() for cell in line.strip("|").split("|")] for line in page.splitlines() if "|" in line
+    ]
+    told = {row[0]: dict(zip(rows[0][1:], row[1:], strict=True)) for row in rows[2:]}
+    assert set(rows[0][1:]) == {preset.label for preset in PRESETS.values()}
+    for gesture, name in (("orbit", "Look around"), ("pan", "Slide"), ("zoom", "Nearer")):
+        for preset in PRESETS.values():
+            ways = re.split(
+                r", | or ", told[name][preset.label].replace(" drag", "").replace(" on nothing", "")
+            )
+            known = [text for text, found in preset.drags.items() if found == gesture]
+            fingers = [keys for keys, found in preset.fingers.items() if found == gesture]
+            known += [f"{keys}+two fingers" if keys else "two fingers" for keys in fingers]
+            known += (["pinch"] if preset.fingers else ["wheel"]) if gesture == "zoom" else []
+            assert sorted(ways) == sorted(known), (name, preset.label)
