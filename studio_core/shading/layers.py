@@ -71,21 +71,21 @@ def parts_of(hits: Hits, surfaces: Surfaces) -> tuple[Part, ...]:
 def _layers(hits: Hits, surfaces: Surfaces) -> tuple[Layer, ...]:
     """The hits and what is seen through them, each with what the surfaces before it let through."""
     made: list[Layer] = []
-    materials = surfaces.mesh.face_material
-
-    def add(layer: Hits, samples: I64, arrives: F32) -> None:
-        weight = arrives.copy()
-        if layer.behind and not len(weight):
-            weight = np.ones(len(layer.face), np.float32)
-        made.append(Layer(layer, samples, weight, caught_hits(layer, surfaces)))
-        for index, rest in layer.behind:
-            alpha = surfaces.opacity[materials[layer.face[index]]]
-            passed = weight[index] * (1 - alpha)
-            weight[index] *= alpha
-            add(rest, samples[index] if len(samples) else index, passed)
-
-    add(hits, EVERY, _FULLY)
+    _add_layers(hits, EVERY, _FULLY, surfaces, made)
     return tuple(made)
+
+
+def _add_layers(hits: Hits, samples: I64, arrives: F32, surfaces: Surfaces, made: list[Layer]) -> None:
+    """Not inside the other: a function that knows itself keeps all it knows until cycles are looked for."""
+    weight = arrives.copy()
+    if hits.behind and not len(weight):
+        weight = np.ones(len(hits.face), np.float32)
+    made.append(Layer(hits, samples, weight, caught_hits(hits, surfaces)))
+    for index, rest in hits.behind:
+        alpha = surfaces.opacity[surfaces.mesh.face_material[hits.face[index]]]
+        passed = weight[index] * (1 - alpha)
+        weight[index] *= alpha
+        _add_layers(rest, samples[index] if len(samples) else index, passed, surfaces, made)
 
 
 def caught_hits(hits: Hits, surfaces: Surfaces) -> I64:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
+import gc
+import weakref
 from itertools import pairwise
 
 import numpy as np
@@ -198,6 +200,31 @@ def test_a_cancelled_picture_ends_between_bands(make, monkeypatch):
     job.cancel()
     with pytest.raises(Cancelled):
         next(bands)
+
+
+def test_bands_that_were_written_are_let_go_at_once(make, monkeypatch):
+    """Memory stays that of a band: nothing waits for cycles to be looked for."""
+    monkeypatch.setattr("studio_core.shading.bands.GUIDE_SAMPLES", 0)
+    seen = []
+    real = LocatedPrimaryStage.run
+
+    def spy(self, frame, inputs, job):
+        hits = real(self, frame, inputs, job)
+        seen.append(weakref.ref(hits))
+        return hits
+
+    scene = scene_with_glass()
+    maker = make()
+    maker.shade(scene, view_of(scene), Job("Shading"))
+    monkeypatch.setattr(LocatedPrimaryStage, "run", spy)
+    gc.disable()
+    try:
+        for _ in maker.bands(Job("Rendering"), Parts(transparent=True, lights=True), most=600):
+            pass
+        assert len(seen) > 10
+        assert sum(hits() is not None for hits in seen) <= 2
+    finally:
+        gc.enable()
 
 
 def test_the_bar_only_moves_on_and_ends_full(make):
