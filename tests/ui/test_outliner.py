@@ -10,7 +10,8 @@ from typing import Any
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from PySide6.QtCore import QModelIndex, Qt
+from PySide6.QtCore import QModelIndex, QSize, Qt
+from PySide6.QtGui import QIcon
 from PySide6.QtTest import QAbstractItemModelTester
 from PySide6.QtWidgets import QApplication, QLineEdit
 from random_edits import random_edit
@@ -24,6 +25,7 @@ from studio_core.scene.diff import diff
 from studio_core.scene.nodes import Camera, Environment, Group, MeshObject, NodeId, PointLamp, Scene
 from studio_core.scene.transform import Transform
 from studio_ui.editing import Editing
+from studio_ui.icons import icon
 from studio_ui.material_drag import material_data
 from studio_ui.panels.node_kinds import kind_name, kinds_name
 from studio_ui.panels.outliner_filter import OutlinerFilter
@@ -307,3 +309,12 @@ def test_a_choice_of_many_rows_is_a_few_ranges(driver: Driver) -> None:
     ranges = panel.tree.selectionModel().selection()
     assert ranges.size() <= 10
     assert {panel.model.node(panel.proxy.mapToSource(i)) for i in ranges.indexes()} == set(chosen)
+
+
+def test_icons_of_chosen_rows_stand_out_from_them(qapp: QApplication) -> None:
+    """Also of unfolded ones, which trees draw as if they were switched on."""
+    made = icon("eye", "#808080", selected="#102030")
+    for state in (QIcon.State.Off, QIcon.State.On):
+        image = made.pixmap(QSize(24, 24), QIcon.Mode.Selected, state).toImage()
+        colours = [image.pixelColor(x, y) for x in range(24) for y in range(24)]
+        assert {colour.name() for colour in colours if colour.alpha() == 255} == {"#102030"}

@@ -140,7 +140,8 @@ def icon(name: str, colour: str, on: str = "", selected: str = "") -> QIcon:
     for ratio in (1, 2, 3):
         made.addPixmap(_pixmap(name, QColor(colour), ratio), QIcon.Mode.Normal, QIcon.State.Off)
         made.addPixmap(_pixmap(name, QColor(on or colour), ratio), QIcon.Mode.Normal, QIcon.State.On)
-        made.addPixmap(_pixmap(name, QColor(selected or colour), ratio), QIcon.Mode.Selected)
+        for state in (QIcon.State.Off, QIcon.State.On):  # trees draw what is unfolded as on
+            made.addPixmap(_pixmap(name, QColor(selected or colour), ratio), QIcon.Mode.Selected, state)
         made.addPixmap(_pixmap(name, faded, ratio), QIcon.Mode.Disabled)
     return made
 
