@@ -48,6 +48,20 @@ def test_an_empty_scene_can_be_begun_with(driver: Driver) -> None:
     assert page(driver).isVisible(), "a document later it is there again"
 
 
+def test_a_new_room_is_begun_with_daylight(make: Make) -> None:
+    driver = make()
+    driver.do("file.new")
+    button = next(b for b, _ in page(driver).buttons if b.text() == "New room")
+    button.click()
+    assert page(driver).isHidden()
+    driver.until(lambda: driver.labels()[-1] == "Daylight")
+    scene = driver.document.scene
+    assert [type(node).__name__ for node in scene.children(None)] == ["Room", "Environment"]
+    driver.do("edit.undo")
+    driver.do("edit.undo")
+    assert page(driver).isVisible()
+
+
 def test_recent_projects_have_pictures_and_open(make: Make, tmp_path: Path) -> None:
     driver = make()
     driver.show(room())

@@ -28,6 +28,7 @@ from studio_ui.dialogs import Dialogs
 from studio_ui.environment_shelf import EnvironmentShelf
 from studio_ui.features import Feature, gather
 from studio_ui.files.drops import Drops
+from studio_ui.files.first_room import FirstRoom
 from studio_ui.files.front import Front
 from studio_ui.files.importing import Importing
 from studio_ui.files.saved_label import SavedLabel
@@ -102,7 +103,9 @@ class MainWindow(QMainWindow):
         features = self._features()
         load = self.transfer.load_environment
         self.drops = Drops(self, context, viewport, self.ask, self.files, self.importing, load)
-        self.front = Front(context, viewport.widget, self.files, self._samples, load, self.drops.overlay)
+        room = FirstRoom(context, self.rooms.add, self.viewing.frame_all, self._samples)
+        over = self.drops.overlay
+        self.front = Front(context, viewport.widget, self.files, self._samples, load, over, room.begin)
         self.backend_watch = BackendWatch(context, self)
         self.front.widget.bar(self.backend_watch.bar)
         self.setCentralWidget(stacked(self.hints, self.front.widget))
@@ -152,6 +155,7 @@ class MainWindow(QMainWindow):
         self.camera_pictures = CameraPictures(context, self.cameras, settings.folder / "cameras")
         self.aids = ViewAids(context, viewport, self.tools.looking, self.viewing, self.cameras, settings)
         self.transfer = Transfer(context, self.ask, self.files.beside)
+        self.rooms = Rooms(context, self.status.say)
         self.importing = Importing(context, self.ask, settings, self.viewing.frame_all)
         self.canvas = CanvasChoice(viewport, settings, context.journal.write)
         self.appearance = Appearance(self.preferences, viewport, self.canvas)
@@ -195,7 +199,7 @@ class MainWindow(QMainWindow):
             Choosing(context),
             ConsoleDoor(self.panels["console"], self.docks["console"]),
             Help(self, context, settings, self.shortcuts, self.viewing.mouse),
-            Rooms(context, self.status.say),
+            self.rooms,
         ]
 
     def _panels(self) -> list[tuple[Panel, Qt.DockWidgetArea]]:

@@ -31,9 +31,11 @@ class Front:
         samples: Mapping[str, Path],
         load_environment: Callable[[], object],
         drop_overlay: DropOverlay,
+        new_room: Callable[[], object],
     ) -> None:
         self.widget = Layered(canvas)
         begin = [
+            Begin("New room", "A room with a window, a door and daylight", "room", new_room),
             Begin("Empty scene", "Begin with nothing", "new", self._empty),
             Begin("Open…", "Open a project", "open", files.choose),
             Begin("Load environment…", "Light from an HDR picture", "environment", load_environment),
