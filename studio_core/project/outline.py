@@ -30,8 +30,8 @@ class Outline:
 
     @property
     def objects(self) -> int:
-        """Meshes."""
-        return self.nodes.get("mesh", 0)
+        """Meshes and rooms."""
+        return self.nodes.get("mesh", 0) + self.nodes.get("room", 0)
 
 
 def outline(path: Path, revision: int | None = None) -> Outline:

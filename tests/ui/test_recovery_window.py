@@ -8,6 +8,7 @@ import shutil
 import signal
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -363,3 +364,20 @@ def test_recovered_pictures_are_forgotten_with_the_file(make: Make, tmp_path: Pa
     driver.do("file.new")
     driver.until(lambda: not path.exists())
     assert keeper.thumbnails.find(path) is None
+
+
+def test_work_that_was_kept_before_it_was_seen_gets_its_picture_later(make: Make) -> None:
+    driver = make(threads=True)
+    driver.fake.gate = threading.Event()
+    driver.open(room())
+    rename(driver, "Other")
+    keeper = driver.window.files.keeper
+    driver.until(lambda: keeper.autosaver.due(time.monotonic()) or keeper.kept.where == "autosaved")
+    driver.window.files.tick()
+    driver.until(lambda: keeper.kept.where == "autosaved")
+    path = keeper.path
+    assert keeper.thumbnails.find(path) is None
+    driver.fake.gate.set()
+    driver.settle()
+    driver.window.files.tick()
+    driver.until(lambda: keeper.thumbnails.find(path) is not None)

@@ -45,6 +45,7 @@ class Keeper:
         self._lock: ProjectLock | None = None
         self._leftover: Path | None = None  # a recovered file, kept until there is a newer one
         self._pictured = -_PICTURE_EVERY
+        self._unpictured: Path | None = None
 
     @property
     def path(self) -> Path | None:
@@ -91,7 +92,7 @@ class Keeper:
         """Remove the recovery file, after what the files' thread still has to write."""
         self._drop_leftover()
         file, lock = self._file, self._lock
-        self._file = self._lock = None
+        self._file = self._lock = self._unpictured = None
 
         def remove() -> None:
             if file is not None:
@@ -106,6 +107,9 @@ class Keeper:
         """Asked by a timer: autosave when it is due."""
         context, file = self._context, self._file
         now = time.monotonic()
+        if self._unpictured is not None and (late := self.picture(self._unpictured)) is not None:
+            self._unpictured, self._pictured = None, now
+            self._executor.submit(late)
         if file is None or not self.autosaver.due(now) or context.document.in_gesture:
             return
         if not context.document.modified:
@@ -130,6 +134,8 @@ class Keeper:
             self._drop_leftover()
             if picture is not None:
                 self._pictured = now
+            elif self.kept.where != "autosaved":
+                self._unpictured = file.path  # nothing had been seen yet
             if self._file is file:
                 self._tell(Kept("autosaved", time.time()))
 
