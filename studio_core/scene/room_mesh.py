@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
@@ -12,13 +13,13 @@ import numpy as np
 from studio_core.scene.geometry import Geometry
 from studio_core.scene.polygon import triangulate
 from studio_core.scene.room_cells import Cell, Solid, cells
-from studio_core.scene.room_shape import Point, RoomShape
+from studio_core.scene.room_shape import Placed, Point, RoomShape
 
 _Face = tuple[Point, Point, float, float, int]  # upright: from left to right as seen from its front
 
 
 def room_geometry(shape: RoomShape) -> Geometry:
-    """The mesh of a room; rooms of one shape share it as long as one of them lives.
+    """The mesh of a room; rooms that are built alike share it as long as one of them lives.
 
     Normals are those of the faces, inside towards the room; uvs are metres: along walls and up, x and -z on
     floor and ceiling. Raises ValueError, in a sentence, when the shape cannot be built.
@@ -26,12 +27,20 @@ def room_geometry(shape: RoomShape) -> Geometry:
     made = _known.get(shape)
     if made is None:
         shape.check()
-        made = _known[shape] = _built(cells(shape))
+        placed = sorted(shape.placed(), key=lambda one: (one.wall, one.start))
+        holes = tuple(dataclasses.replace(one, opening=0) for one in placed)
+        alike = (dataclasses.replace(shape, openings=()), holes)
+        made = _alike.get(alike)
+        if made is None:
+            made = _alike[alike] = _built(cells(shape))
+        _known[shape] = made
     return made
 
 
 _known: WeakValueDictionary[RoomShape, Geometry] = WeakValueDictionary()
 """Pure results, remembered while they live, so that a node that is copied or undone keeps its mesh."""
+_alike: WeakValueDictionary[tuple[RoomShape, tuple[Placed, ...]], Geometry] = WeakValueDictionary()
+"""The same by what is built: a window that is pushed on where its wall ends changes nothing."""
 
 
 def _built(parts: Sequence[Cell]) -> Geometry:

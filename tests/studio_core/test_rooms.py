@@ -83,7 +83,9 @@ def test_a_drag_of_a_size_is_one_step_and_touches_the_room_s_mesh_alone() -> Non
         ({"skirting": 0.1}, Aspect.NAME | Aspect.GEOMETRY),
         ({"without": (2,)}, Aspect.NAME | Aspect.GEOMETRY),
         ({"openings": ()}, Aspect.NAME | Aspect.GEOMETRY),
-        ({"openings": (WINDOW, Opening(sill=2.58))}, Aspect.NAME | Aspect.GEOMETRY),
+        ({"openings": (dataclasses.replace(WINDOW, along=0.1),)}, Aspect.NAME | Aspect.GEOMETRY),
+        ({"openings": (WINDOW, Opening(sill=2.58))}, Aspect.NAME),
+        ({"openings": (Opening(sill=2.58), WINDOW)}, Aspect.NAME),
         ({"hidden": True}, Aspect.STRUCTURE),
     ],
 )
