@@ -55,6 +55,7 @@ def test_an_arrow_lights_up_and_moves_along_its_axis_as_one_step(driver: Driver)
     at = arm(driver, 0)
     driver.move(at)
     assert driver.window.tools._lit == Handle("axis", 0)
+    assert driver.viewport.cursor().shape() is Qt.CursorShape.PointingHandCursor
     assert "along X" in driver.window.status.message.text()
     before = driver.document.scene
     driver.press(at)
@@ -154,7 +155,7 @@ def test_a_drag_changes_its_axis_on_the_way(driver: Driver) -> None:
     x, y, z = place(driver)
     assert (x, z) == (1.0, 0.0)
     assert y > 0.2
-    press_keys(driver, "Y")
+    driver.bot.keyClick(driver.viewport, Qt.Key.Key_Y, SHIFT)
     driver.move(at + QPoint(60, 30))
     assert place(driver)[1] == 0.0
     driver.bot.keyClick(driver.viewport, Qt.Key.Key_Escape)

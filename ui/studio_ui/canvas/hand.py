@@ -188,5 +188,7 @@ def _name(event: QKeyEvent) -> str:
     text = event.text()
     if known is not None or len(text) != 1 or not text.isprintable():
         return known or ""
-    small = text.lower()
-    return f"shift+{small}" if small != text and text.isalpha() else text
+    if not text.isalpha():
+        return text
+    shifted = bool(event.modifiers() & Qt.KeyboardModifier.ShiftModifier)  # and not caps lock
+    return f"shift+{text.lower()}" if shifted else text.lower()

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
+from PySide6.QtCore import Qt
 
 from studio_core.document import Document
 from studio_core.scene.arranging import roots
@@ -61,6 +62,7 @@ class CanvasTools:
         self._mode = ""  # "", click, look, hold, band
         self._lit: Handle | None = None  # under the mouse, or pressed
         self._banding = False  # the next drag draws a band
+        self._grabs = False  # as the cursor shows
         self._placed: tuple[object, Frame | None] | None = None
         viewport.want_keys(self._wants)
         self._off = [
@@ -105,6 +107,11 @@ class CanvasTools:
         if found is not None:
             boxes = box_segments(*found)
         self._viewport.set_guides(view, glyphs(scene, view, chosen), boxes, self._overlay())
+        grabs = self._lit is not None or self.holding.active
+        if grabs != self._grabs:
+            self._grabs = grabs
+            shape = Qt.CursorShape.PointingHandCursor if grabs else Qt.CursorShape.ArrowCursor
+            self._viewport.widget.setCursor(shape)
 
     def gizmo(self) -> Gizmo | None:
         """The handles of the tool in use, on what is chosen."""

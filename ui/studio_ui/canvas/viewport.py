@@ -134,9 +134,9 @@ class Viewport(Protocol):
     def want_keys(self, wanted: Callable[[str], bool]) -> None:
         """Keys of these names come as `key` signals, before all shortcuts of the window.
 
-        A letter is named as it is typed, with `shift+` before a capital one; others are `enter`,
-        `backspace`, `escape`. Keys with Ctrl, Alt or Meta have no name. `focus` is released when the keyboard
-        goes to another part of the window.
+        A letter is named in small, with `shift+` before one that is typed with Shift; other keys are
+        `enter`, `backspace`, `escape`, or what they type. Keys with Ctrl, Alt or Meta have no name. `focus` is
+        released when the keyboard goes to another part of the window.
         """
         ...
 
