@@ -135,8 +135,8 @@ class Viewport(Protocol):
         """Keys of these names come as `key` signals, before all shortcuts of the window.
 
         A letter is named in small, with `shift+` before one that is typed with Shift; other keys are
-        `enter`, `backspace`, `escape`, or what they type. Keys with Ctrl, Alt or Meta have no name. `focus` is
-        released when the keyboard goes to another part of the window.
+        `enter`, `backspace`, `escape`, or what they type. Keys with Ctrl, Alt or Meta have no name.
+        `focus` is released when the keyboard goes to another part of the window.
         """
         ...
 
