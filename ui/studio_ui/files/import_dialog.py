@@ -19,6 +19,7 @@ from studio_core.params import ParamInfo
 from studio_core.scene.imported import Up
 from studio_ui.files.import_preview import ImportPreview
 from studio_ui.files.import_question import UNITS, ImportChoice, ImportQuestion
+from studio_ui.files.leftovers import counted
 from studio_ui.number_style import number_style
 from studio_ui.panels.panel import heading, note
 from studio_ui.spin import Spin
@@ -96,7 +97,7 @@ class ImportDialog(QDialog):
         question = self._question
         form = QFormLayout()
         form.setHorizontalSpacing(12)
-        counts = f"{question.triangles:,} triangles, {question.materials} materials"
+        counts = f"{counted(question.triangles, 'triangle')}, {counted(question.materials, 'material')}"
         form.addRow("In it", QLabel(counts))
         form.addRow("Unit of the file" if not question.correcting else "Correction", self.unit)
         form.addRow("Factor", self.factor)

@@ -39,14 +39,19 @@ class Leftover:
             change = self.recovered.nodes.get(kind, 0) - self.saved.nodes.get(kind, 0)
             if change:
                 word = _KINDS.get(kind, kind.replace("_", " "))
-                parts.append(f"{abs(change)} {word}{'s' if abs(change) > 1 else ''} {_way(change)}")
+                parts.append(f"{counted(abs(change), word)} {_way(change)}")
         change = self.recovered.materials - self.saved.materials
         if change:
-            parts.append(f"{abs(change)} material{'s' if abs(change) > 1 else ''} {_way(change)}")
+            parts.append(f"{counted(abs(change), 'material')} {_way(change)}")
         return f"The recovered version has {', '.join(parts)}." if parts else ""
 
 
 _KINDS = {"mesh": "object", "point_lamp": "lamp", "spot_lamp": "spot lamp", "directional_lamp": "sun"}
+
+
+def counted(number: int, what: str) -> str:
+    """`1 object`, `1,200 objects`."""
+    return f"{number:,} {what}{'' if number == 1 else 's'}"
 
 
 def _way(change: int) -> str:

@@ -21,7 +21,7 @@ from PySide6.QtWidgets import (
 from studio_core.project.outline import Outline
 from studio_core.project.records import Revision
 from studio_ui.ask import LeftoverChoice, Recover
-from studio_ui.files.leftovers import Leftover
+from studio_ui.files.leftovers import Leftover, counted
 from studio_ui.files.recent import when_title
 
 _PICTURE = (256, 144)
@@ -165,7 +165,9 @@ def _version(
     if revision is not None:
         words.addWidget(_line(when_title(revision.time), "title" if not title else ""))
     if told is not None:
-        words.addWidget(_line(f"{told.objects} objects, {told.materials} materials", "dim"))
+        words.addWidget(
+            _line(", ".join((counted(told.objects, "object"), counted(told.materials, "material"))), "dim")
+        )
         for number, step in enumerate(told.steps):
             words.addWidget(_line(step if number else f"Done last: {step}", "dim"))
     words.addStretch(1)

@@ -16,6 +16,7 @@ from PySide6.QtWidgets import (
 )
 
 from studio_core.project.outline import Outline
+from studio_ui.files.leftovers import counted
 from studio_ui.files.recent import when_title
 from studio_ui.panels.panel import note
 
@@ -35,7 +36,7 @@ class VersionsDialog(QDialog):
         self.tree.setUniformRowHeights(True)
         for index, one in enumerate(self._found):
             saved = when_title(one.revision.time) + ("  (newest)" if index == 0 else "")
-            item = QTreeWidgetItem([saved, f"{one.objects} objects", ", ".join(one.steps)])
+            item = QTreeWidgetItem([saved, counted(one.objects, "object"), ", ".join(one.steps)])
             item.setToolTip(2, "\n".join(one.steps))
             self.tree.addTopLevelItem(item)
         for column in (0, 1):
