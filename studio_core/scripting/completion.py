@@ -67,7 +67,7 @@ def _sorted(
     if not start.startswith("_"):
         fitting = [word for word in fitting if not word.startswith("_")]
     known = fitting if values is None else values
-    fitting.sort(key=lambda word: (not word.startswith(start), word not in known, word.casefold()))
+    fitting.sort(key=lambda word: (word not in known, not word.startswith(start), word.casefold()))
     made = []
     for word in fitting[:MOST]:
         thing = _attribute(owner, word) if values is None else values.get(word, getattr(builtins, word, None))

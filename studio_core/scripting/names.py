@@ -64,6 +64,9 @@ class Size(NamedTuple):
     depth: float
     height: float
 
+    def __repr__(self) -> str:
+        return f"width {self.width:.3f} × depth {self.depth:.3f} × height {self.height:.3f} m"
+
 
 def at_once(label: str, work: Callable[[Job], T]) -> T:
     """Do heavy work here and now."""

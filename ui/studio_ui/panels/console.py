@@ -134,10 +134,10 @@ class ConsolePanel(Panel):
 
     def run(self, source: str) -> None:
         """Run a command and show what comes of it."""
-        shown = source.rstrip("\n").replace("\n", "\n... ")
+        shown = source.rstrip().replace("\n", "\n... ")
         self.transcript.line(f">>> {shown}", "command")
         if self._held(lambda: self.interpreter.run(source)):
-            self.script.append(source.rstrip("\n"))
+            self.script.append(source.rstrip())
         self._settings.set(_HISTORY, self.editor.history.commands)
 
     def run_script(self, path: Path | None = None) -> None:

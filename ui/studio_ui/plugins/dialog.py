@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import Qt
+from PySide6.QtCore import QSize, Qt
 from PySide6.QtGui import QFontDatabase, QGuiApplication
 from PySide6.QtWidgets import (
     QDialog,
@@ -29,6 +29,7 @@ from studio_ui.tasks import Tasks
 OFF = "plugins_off"
 """The setting that holds which plugins of other people are switched off, by `Origin.key`."""
 _HEADINGS = ("Plugin", "State", "Provides", "Version", "From")
+_ROW = 24  # pixels
 _ENTRY = Qt.ItemDataRole.UserRole
 _PLURALS = {"brdf": "materials", "importer": "reads", "exporter": "writes", "backend": "backends"}
 _LOADING = "Loading all plugins"
@@ -51,7 +52,6 @@ class PluginsDialog(QDialog):
         self.tree.setAccessibleName("Plugins")
         self.tree.setHeaderLabels(list(_HEADINGS))
         self.tree.setRootIsDecorated(False)
-        self.tree.setUniformRowHeights(True)
         self.detail = QPlainTextEdit()
         self.detail.setReadOnly(True)
         self.detail.setAccessibleName("Details of the chosen plugin")
@@ -137,6 +137,7 @@ class PluginsDialog(QDialog):
         item = QTreeWidgetItem([entry.name, entry.state.capitalize(), _provides(entry), version, *kept])
         item.setData(0, _ENTRY, entry)
         item.setToolTip(2, _provides(entry))
+        item.setSizeHint(0, QSize(0, _ROW))
         if origin is not None and not origin.bundled:
             item.setFlags(item.flags() | Qt.ItemFlag.ItemIsUserCheckable)
             on = origin.key not in self._off
