@@ -59,6 +59,20 @@ def test_the_list_says_who_has_a_material(driver: Driver) -> None:
     assert len(driver.labels()) == 4
 
 
+def test_materials_are_found_by_name(driver: Driver) -> None:
+    panel = panel_of(driver)
+
+    def listed() -> list[str]:
+        return [row.text(0) for row in panel.list.rows.values() if not row.isHidden()]
+
+    panel.find.setText("BL")
+    assert listed() == ["Blue"]
+    driver.document.apply(AddMaterial(Material(id="x", name="Black")))
+    driver.until(lambda: listed() == ["Blue", "Black"])
+    panel.find.clear()
+    assert listed() == ["Red", "Blue", "Black"]
+
+
 def test_a_material_is_renamed_in_place(driver: Driver) -> None:
     panel = choose(driver, "red")
     driver.window.docks["materials"].raise_()

@@ -26,6 +26,7 @@ class MaterialList(QTreeWidget):
         self.chosen: Callable[[tuple[MaterialId, ...]], object] = lambda materials: None
         self.renamed: Callable[[MaterialId, str], object] = lambda material, name: None
         self.rows: dict[MaterialId, QTreeWidgetItem] = {}
+        self._wanted = ""
         self._shown: dict[MaterialId, tuple[Material, int]] = {}
         self._theme = DARK
         self.setAccessibleName("Materials")
@@ -75,6 +76,15 @@ class MaterialList(QTreeWidget):
                     self._shown[material] = value
                     self._draw(item, *value)
 
+    def narrow(self, text: str) -> None:
+        """Only materials whose names hold `text`."""
+        self._wanted = text.strip().casefold()
+        for item in self.rows.values():
+            self._hide(item)
+
+    def _hide(self, item: QTreeWidgetItem) -> None:
+        item.setHidden(self._wanted not in item.text(_NAME).casefold())
+
     def select_materials(self, materials: Iterable[MaterialId]) -> None:
         """Those rows, without telling."""
         with QSignalBlocker(self):
@@ -123,6 +133,7 @@ class MaterialList(QTreeWidget):
         item.setFlags(flags & ~Qt.ItemFlag.ItemIsDropEnabled)
         item.setData(_NAME, _ROLE, material.id)
         item.setText(_NAME, material.name)
+        self._hide(item)
         item.setIcon(_NAME, swatch(material, self.devicePixelRatioF()))
         item.setText(_USERS, str(users) if users else "unused")
         item.setTextAlignment(_USERS, Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)

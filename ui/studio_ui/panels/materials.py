@@ -6,7 +6,7 @@ import dataclasses
 from pathlib import Path
 
 from PySide6.QtCore import QPoint, Qt, QTimer
-from PySide6.QtWidgets import QMenu, QPushButton, QSplitter, QToolButton, QWidget
+from PySide6.QtWidgets import QLineEdit, QMenu, QPushButton, QSplitter, QToolButton, QWidget
 
 from studio_core.edits import AddMaterial, Compound, RemoveMaterial, SetMaterial
 from studio_core.scene.diff import Aspect, Changes
@@ -37,6 +37,11 @@ class MaterialsPanel(Panel):
         self.list.chosen = self._chosen
         self.list.renamed = self._rename
         self.list.customContextMenuRequested.connect(self._menu)
+        self.find = QLineEdit()
+        self.find.setPlaceholderText("Find a material")
+        self.find.setAccessibleName("Find a material")
+        self.find.setClearButtonEnabled(True)
+        self.find.textChanged.connect(self.list.narrow)
         self.editor = MaterialForm(context, self.tool)
         add = self.tool("add", "New material")
         copy = self.tool("duplicate", "Duplicate the chosen material")
@@ -53,6 +58,7 @@ class MaterialsPanel(Panel):
         self.slot.setMinimumContentsLength(5)
         top = QWidget()
         above = self.column_of(top)
+        above.addWidget(self.find)
         above.addWidget(self.list, 1)
         above.addLayout(row(add, copy, self._delete_button(), self.users, self.assign, self.slot, stretch=4))
         below = QWidget()
