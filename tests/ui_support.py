@@ -96,7 +96,7 @@ def see(scene: Scene, view: View) -> Picture:
         low, high = (world[:3, :3] @ corner + world[:3, 3] for corner in node.geometry.bounds)
         low, high = np.minimum(low, high), np.maximum(low, high)
         seen = _window(view, low, high)
-        with np.errstate(divide="ignore"):
+        with np.errstate(divide="ignore", invalid="ignore"):
             a, b = (low - eye_of(view)) / towards[seen], (high - eye_of(view)) / towards[seen]
         enter, leave = np.minimum(a, b).max(axis=-1), np.maximum(a, b).min(axis=-1)
         hit = (enter <= leave) & (leave > 0) & (enter < nearest[seen])
