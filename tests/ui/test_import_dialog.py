@@ -113,6 +113,8 @@ def test_the_dialog_shows_sizes_and_gives_what_was_chosen(qapp: QApplication) ->
     assert "unusual" in asked.doubt
     dialog = ImportDialog(None, asked)
     assert nameless(dialog) == []
+    dialog.show()
+    assert nameless(dialog) == []
     assert dialog.choice() == asked.guess
     assert dialog.size.text().startswith("0.75 × 0.75 × 1.5")
     dialog.unit.setCurrentIndex(2)  # millimetres

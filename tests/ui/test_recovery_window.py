@@ -158,12 +158,16 @@ def test_the_dialog_tells_both_versions_apart(qapp: QApplication) -> None:
     other.recovered.click()
     assert other.answer == "recovered"
     for made in (dialog, other):
+        made.show()
+        assert nameless(made) == []
         made.deleteLater()
 
 
 def test_several_leftovers_are_opened_discarded_or_kept(qapp: QApplication) -> None:
     found = [leftover(with_saved=False) for _ in range(3)]
     dialog = LeftoversDialog(None, found)
+    assert nameless(dialog) == []
+    dialog.show()
     assert nameless(dialog) == []
     assert "3 scenes" in words(dialog)
     dialog.rows[1][3].click()
@@ -347,6 +351,8 @@ def test_the_versions_dialog_lists_the_newest_first(qapp: QApplication) -> None:
     assert empty.chosen is None
     assert not empty.open_button.isEnabled()
     for made in (dialog, empty):
+        made.show()
+        assert nameless(made) == []
         made.deleteLater()
 
 
