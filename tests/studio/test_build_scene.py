@@ -16,7 +16,7 @@ from scenes import little_scene
 import studio.build_scene
 from studio.build_scene import MeshRequest, build, floor, load_model, parse_camera, set_material
 from studio.cli import parser
-from studio.verbs import parse_size
+from studio.verbs_pictures import parse_size
 from studio_core.contract import ImportedModel
 from studio_core.errors import InputError, LucarneError
 from studio_core.imaging.encode import write_exr
