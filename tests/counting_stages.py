@@ -7,7 +7,7 @@ from typing import Any
 
 from studio_core.errors import Cancelled
 from studio_core.scene.diff import Aspect, Changes
-from studio_core.scene.nodes import Light, Scene
+from studio_core.scene.nodes import Camera, Light, Scene
 from studio_core.session import View
 from studio_core.shading.frame import Frame
 from studio_core.shading.job import Job
@@ -15,7 +15,7 @@ from studio_core.shading.pipeline import Inputs, Pipeline
 
 
 class Places(dict):  # type: ignore[type-arg]
-    """World matrix of every node."""
+    """World matrix of every node that light meets; cameras are none."""
 
 
 class Looks(dict):  # type: ignore[type-arg]
@@ -27,7 +27,7 @@ class Gains(dict):  # type: ignore[type-arg]
 
 
 class Count(int):
-    """How many nodes there are, in tens: often the same again."""
+    """How many nodes there are without cameras, roughly: often the same again."""
 
 
 class Summary(tuple):
@@ -72,7 +72,7 @@ class PlacesStage(Stage):
         scene = frame.scene
         for node in [*inputs.changes.nodes, *(() if inputs.previous else scene.nodes)]:
             made.pop(node, None)
-            if node in scene.nodes:
+            if node in scene.nodes and not isinstance(scene[node], Camera):
                 made[node] = scene.world(node)
         return made
 
@@ -112,7 +112,8 @@ class CountStage(Stage):
     dirtied_by = Aspect.STRUCTURE
 
     def make(self, frame: Frame, inputs: Inputs) -> Count:
-        made = Count(len(frame.scene.nodes) // 4)
+        cameras = sum(1 for _ in frame.scene.of(Camera))
+        made = Count((len(frame.scene.nodes) - cameras + 1) // 4)
         return inputs.previous if made == inputs.previous else made
 
 
