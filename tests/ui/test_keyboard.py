@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import gc
+
 import pytest
 from names import nameless
 from PySide6.QtCore import QPoint, Qt
@@ -82,6 +84,18 @@ def test_f6_goes_round_picture_bars_and_panels(chosen: Driver) -> None:
     assert QApplication.focusWidget() is not picture
     chosen.do("window.next")
     assert QApplication.focusWidget() is picture
+
+
+def test_going_round_leaves_the_menus_alone(chosen: Driver) -> None:
+    """What Python knows of Qt's widgets must outlive being looked at."""
+    for _ in chosen.window.keyboard.places:
+        chosen.do("window.next")
+    gc.collect()
+    chosen.window.menus.fill_recent()
+    chosen.window.menus.fill_cameras()
+    chosen.window.palette_.open()
+    assert len(chosen.window.palette_.found) > 60
+    chosen.window.palette_.close()
 
 
 def test_a_panel_is_come_back_to_where_it_was_left(chosen: Driver) -> None:
