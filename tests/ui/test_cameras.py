@@ -16,10 +16,10 @@ from studio_core.edits import Add, Compound, Move, Remove, Reparent, SetFields
 from studio_core.scene.nodes import Camera, Group
 from studio_core.scene.transform import Transform, looking
 from studio_core.session import View
-from studio_ui.cameras import Cameras
 from studio_ui.canvas.framing import ASPECTS, fitted, frame_in, unfitted
 from studio_ui.canvas.projection import extent, project
 from studio_ui.canvas.viewport import Pointer
+from studio_ui.views.cameras import Cameras
 
 NONE, MIDDLE = Qt.KeyboardModifier.NoModifier, Qt.MouseButton.MiddleButton
 FRONT = Camera(

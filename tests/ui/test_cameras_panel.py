@@ -13,9 +13,9 @@ from ui_support import Driver, Make, room
 from studio_core.edits import Add, Move, SetFields
 from studio_core.scene.nodes import Camera, PointLamp
 from studio_core.scene.transform import Transform, looking
-from studio_ui.camera_pictures import as_image
 from studio_ui.panels.camera_list import ID, IMAGE, LENS, SEEN
 from studio_ui.panels.cameras import CamerasPanel
+from studio_ui.views.camera_pictures import as_image
 
 NAMES = ("Front", "Side", "Above")
 PLACES = ((0.0, 1.5, 6.0), (6.0, 1.5, 1.0), (0.5, 7.0, 0.5))

@@ -18,7 +18,7 @@ from studio_core.scene.bounds import exact_bounds
 from studio_core.scene.nodes import Environment, Scene
 from studio_ui.files.drop_intent import intent_of
 from studio_ui.files.landing import Landing, beside, landing, placed_model
-from studio_ui.material_drag import material_data
+from studio_ui.objects.material_drag import material_data
 
 KNOWN = (".obj", ".glb")
 

@@ -10,7 +10,7 @@ from ui_support import Driver
 from studio_core.edits import AddMaterial
 from studio_core.params import param_infos
 from studio_core.scene.nodes import Material
-from studio_ui.colour_button import to_display, to_linear
+from studio_ui.forms.colour_button import to_display, to_linear
 from studio_ui.panels.outliner_model import EYE, NAME
 
 

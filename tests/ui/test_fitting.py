@@ -9,7 +9,7 @@ from PySide6.QtCore import QRect
 from PySide6.QtWidgets import QLabel, QWidget
 from ui_support import Driver
 
-from studio_ui.fitting import show_what_fits
+from studio_ui.look.fitting import show_what_fits
 
 
 class _Wide(QWidget):

@@ -17,11 +17,11 @@ from studio_core.params import ParamInfo
 from studio_core.registry import PluginHost
 from studio_ui.console.running import StopDialog
 from studio_ui.dialogs import KeysDialog
-from studio_ui.fields import TextField
 from studio_ui.files.report import ReportDialog
+from studio_ui.forms.fields import TextField
+from studio_ui.forms.sinks import PlainSink
 from studio_ui.keyboard import in_order
 from studio_ui.plugins.dialog import PluginsDialog
-from studio_ui.sinks import PlainSink
 
 
 def usable(place: QWidget) -> list[QWidget]:

@@ -19,13 +19,13 @@ from studio_core.project.records import History
 from studio_core.project.store import save
 from studio_core.scene.geometry import Image
 from studio_core.scene.nodes import Environment, PointLamp, Scene, SpotLamp
-from studio_ui.environment_shelf import (
+from studio_ui.panels.dial import wrapped
+from studio_ui.panels.environment_shelf import (
     EnvironmentShelf,
     kept_thumbnail,
     set_environment,
     small_picture,
 )
-from studio_ui.panels.dial import wrapped
 from studio_ui.panels.lamps import LAMPS
 from studio_ui.panels.lighting import LightingPanel
 
@@ -35,7 +35,7 @@ LAMPS_THERE = (PointLamp(id="left", name="Left"), PointLamp(id="right", name="Ri
 
 @pytest.fixture(autouse=True)
 def own_cache(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
-    monkeypatch.setattr("studio_ui.environment_shelf.user_cache", lambda: tmp_path / "cache")
+    monkeypatch.setattr("studio_ui.panels.environment_shelf.user_cache", lambda: tmp_path / "cache")
     return tmp_path / "cache"
 
 
@@ -280,7 +280,7 @@ def test_thumbnails_are_kept_until_the_file_changes(
     tmp_path: Path, own_cache: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     from studio_core.imaging import environment
-    from studio_ui.environment_shelf import Entry
+    from studio_ui.panels.environment_shelf import Entry
 
     read: list[Path] = []
     really: Callable[..., Any] = environment.load_environment

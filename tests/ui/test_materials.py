@@ -22,7 +22,7 @@ from studio_core.scene.nodes import Material, MeshObject
 from studio_core.scene.transform import Transform, looking
 from studio_core.session import View
 from studio_ui.canvas.projection import eye_of, ray
-from studio_ui.material_drag import MIME, dragged_material, drop_material, slot_at
+from studio_ui.objects.material_drag import MIME, dragged_material, drop_material, slot_at
 from studio_ui.panels.materials import MaterialsPanel
 from studio_ui.panels.texture_row import small_pixmap
 

@@ -25,8 +25,8 @@ from studio_core.scene.diff import diff
 from studio_core.scene.nodes import Camera, Environment, Group, MeshObject, NodeId, PointLamp, Scene
 from studio_core.scene.transform import Transform
 from studio_ui.editing import Editing
-from studio_ui.icons import icon
-from studio_ui.material_drag import material_data
+from studio_ui.look.icons import icon
+from studio_ui.objects.material_drag import material_data
 from studio_ui.panels.node_kinds import kind_name, kinds_name
 from studio_ui.panels.outliner_filter import OutlinerFilter
 from studio_ui.panels.outliner_model import EYE, LOCK, NAME, OutlinerModel

@@ -12,8 +12,8 @@ from ui_support import Driver, Make, room
 
 from studio_core.scene.nodes import MeshObject
 from studio_ui.actions.catalogue import specs
-from studio_ui.fuzzy import folded, match
-from studio_ui.palette import Entry, search
+from studio_ui.palette.fuzzy import folded, match
+from studio_ui.palette.palette import Entry, search
 
 words = st.text(st.characters(categories=["L", "Nd", "Zs", "P"]), max_size=30)
 

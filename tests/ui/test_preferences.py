@@ -17,14 +17,14 @@ from studio.app import cache_limit
 from studio_core.errors import InputError
 from studio_core.params import check
 from studio_core.shading.job import Job
-from studio_ui.appearance import system_theme
+from studio_ui.forms.spin import Spin
+from studio_ui.look.appearance import system_theme
+from studio_ui.look.theme import DARK, LIGHT
 from studio_ui.preferences.cache_part import empty, size_of
 from studio_ui.preferences.catalogue import ALL, BY_NAME, FILES, KEYS, PAGES, Preference
 from studio_ui.preferences.rows import PreferenceRows
 from studio_ui.preferences.store import Preferences
 from studio_ui.settings import Settings
-from studio_ui.spin import Spin
-from studio_ui.theme import DARK, LIGHT
 
 
 @pytest.fixture

@@ -25,9 +25,9 @@ from studio_core.scene.nodes import (
 )
 from studio_core.scene.size import own_size, pivot_words, resized
 from studio_core.scene.transform import Transform, axis_angle
+from studio_ui.forms.spin import MIXED
 from studio_ui.panels.light_fields import kelvin_colour, to_fov, to_lens
 from studio_ui.panels.light_hints import kelvin_words, light_hint, paper_radiance, to_ev
-from studio_ui.spin import MIXED
 
 LAMPS = (
     PointLamp(id="a", name="Left", intensity=2.0),

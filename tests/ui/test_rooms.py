@@ -19,7 +19,7 @@ from studio_core.scene.room_plans import l_cut, l_plan
 from studio_core.scene.room_shape import Opening
 from studio_core.scene.transform import Transform, axis_angle, looking
 from studio_core.session import View
-from studio_ui.rooms import ROUND, is_above, room_around, walls_before
+from studio_ui.objects.rooms import ROUND, is_above, room_around, walls_before
 
 WINDOW = Opening(width=1.5)
 

@@ -14,11 +14,11 @@ from pytestqt.qtbot import QtBot
 
 from studio_core.params import ParamInfo
 from studio_core.units import LENGTH_UNITS
-from studio_ui.fields import NumberField
-from studio_ui.number_style import NumberStyle, number_style, set_number_style
-from studio_ui.param_form import form_label
-from studio_ui.spin import ScrubLabel, Spin
-from studio_ui.theme import DARK, wear
+from studio_ui.forms.fields import NumberField
+from studio_ui.forms.number_style import NumberStyle, number_style, set_number_style
+from studio_ui.forms.param_form import form_label
+from studio_ui.forms.spin import ScrubLabel, Spin
+from studio_ui.look.theme import DARK, wear
 
 LENGTH = ParamInfo("number", "Width", unit="m")
 ANGLE = ParamInfo("number", "Angle", unit="°", low=-180, high=180)

@@ -12,7 +12,7 @@ from PySide6.QtWidgets import QApplication, QCheckBox, QLineEdit, QPushButton, Q
 from pytestqt.qtbot import QtBot
 
 from studio_core.params import parse_colour
-from studio_ui.theme import _ASSETS, DARK, THEMES, Theme, wear
+from studio_ui.look.theme import _ASSETS, DARK, THEMES, Theme, wear
 
 GROUNDS = ("window", "base", "raised")
 

@@ -13,7 +13,7 @@ from studio_core.scene.transform import Transform
 from studio_ui.canvas.gizmos import Handle
 from studio_ui.canvas.overlay import Band, Label
 from studio_ui.canvas.projection import project
-from studio_ui.number_style import NumberStyle, set_number_style
+from studio_ui.forms.number_style import NumberStyle, set_number_style
 
 CHAIR, STOOL = (-1.0, 0.5, 0.5), (1.0, 0.5, 0.5)  # points on the front faces
 NONE, SHIFT, CTRL, ALT = (

@@ -26,8 +26,8 @@ from studio_ui.bridge import Bridge
 from studio_ui.canvas import navigation
 from studio_ui.canvas.projection import axes_of, bounds, eye_of, project, project_segments, ray
 from studio_ui.editing import Editing
-from studio_ui.euler import from_euler, to_euler
-from studio_ui.fields import slider_range
+from studio_ui.forms.euler import from_euler, to_euler
+from studio_ui.forms.fields import slider_range
 from studio_ui.journal import Journal
 from studio_ui.settings import Settings
 from studio_ui.tasks import Tasks

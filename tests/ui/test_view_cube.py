@@ -21,7 +21,7 @@ from studio_ui.canvas.navigation import from_direction
 from studio_ui.canvas.projection import axes_of
 from studio_ui.canvas.raster_viewport import RasterViewport
 from studio_ui.canvas.view_cube import ViewCube
-from studio_ui.main_light import brightest
+from studio_ui.views.main_light import brightest
 
 LEFT = Qt.MouseButton.LeftButton
 

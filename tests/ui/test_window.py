@@ -21,7 +21,7 @@ from studio_core.document import Document
 from studio_ui.actions.catalogue import ACTIONS, specs
 from studio_ui.dialogs import KeysDialog
 from studio_ui.feed import REST_MS
-from studio_ui.icons import ICONS, icon
+from studio_ui.look.icons import ICONS, icon
 
 HEAVY = ("numba", "trimesh", "OpenImageIO", "cv2", "scipy", "embreex", "vispy", "pyqtgraph", "PIL", "mitsuba")
 

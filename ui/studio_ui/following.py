@@ -16,8 +16,8 @@ from studio_ui.canvas.switch_viewport import SwitchViewport
 from studio_ui.canvas.viewport import Pointer
 from studio_ui.context import Context, Subscriptions
 from studio_ui.feed import Shown
+from studio_ui.files.project_files import ProjectFiles
 from studio_ui.plugins.watch import plugin_of
-from studio_ui.project_files import ProjectFiles
 from studio_ui.status import StatusBar
 
 _WELCOME = "Drop a model, a picture of light or a project here,\nor open a sample from the File menu."

@@ -10,10 +10,10 @@ from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QSizePolicy, QToolBut
 from studio_core.scene.diff import Aspect, Changes
 from studio_core.scene.nodes import Scene
 from studio_ui.context import Context, Subscriptions
-from studio_ui.fitting import show_what_fits
-from studio_ui.icons import icon
+from studio_ui.look.fitting import show_what_fits
+from studio_ui.look.icons import icon
+from studio_ui.look.theme import Theme
 from studio_ui.settings import Settings
-from studio_ui.theme import Theme
 
 STEPS = (
     (Aspect.TRANSFORM, "Click a chair, then drag it"),

@@ -9,9 +9,9 @@ from itertools import pairwise
 from PySide6.QtCore import QByteArray, Qt
 from PySide6.QtWidgets import QDockWidget, QMainWindow, QTabBar, QTabWidget
 
+from studio_ui.look.theme import PANEL_WIDTH
 from studio_ui.panels.panel import Panel
 from studio_ui.settings import Settings
-from studio_ui.theme import PANEL_WIDTH
 
 _VERSION = 1  # stored layouts of another number are left alone
 THIRD_PARTY = "plugin-"  # how the ids of plugins' panels begin

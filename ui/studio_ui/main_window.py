@@ -12,27 +12,21 @@ from PySide6.QtWidgets import QMainWindow
 from studio_core.folders import user_cache
 from studio_core.shading.scheduler import Executor
 from studio_ui.actions.action_set import ActionSet
-from studio_ui.appearance import Appearance
-from studio_ui.arranging import Arranging
 from studio_ui.ask import Ask
-from studio_ui.badge import Badge
-from studio_ui.camera_pictures import CameraPictures
-from studio_ui.cameras import Cameras
 from studio_ui.canvas.choice import CanvasChoice
 from studio_ui.canvas.switch_viewport import SwitchViewport
 from studio_ui.canvas.tools import CanvasTools
-from studio_ui.choosing import Choosing
-from studio_ui.commands import Commands
 from studio_ui.context import Context
 from studio_ui.dialogs import Dialogs
-from studio_ui.environment_shelf import EnvironmentShelf
 from studio_ui.features import Feature, gather
 from studio_ui.files.drops import Drops
 from studio_ui.files.first_room import FirstRoom
 from studio_ui.files.front import Front
 from studio_ui.files.importing import Importing
+from studio_ui.files.project_files import ProjectFiles
 from studio_ui.files.saved_label import SavedLabel
 from studio_ui.files.thumbnails import Thumbnails
+from studio_ui.files.transfer import Transfer
 from studio_ui.files.versions import Versions
 from studio_ui.following import Following
 from studio_ui.help import Help
@@ -40,29 +34,35 @@ from studio_ui.hint_bar import HintBar
 from studio_ui.keyboard import Keyboard
 from studio_ui.layout import Layout
 from studio_ui.layouts import Layouts
-from studio_ui.magnet import Magnet
+from studio_ui.look.appearance import Appearance
+from studio_ui.look.badge import Badge
 from studio_ui.menus import Menus
-from studio_ui.palette import Palette, menu_entries
-from studio_ui.palette_scene import scene_entries
+from studio_ui.objects.arranging import Arranging
+from studio_ui.objects.choosing import Choosing
+from studio_ui.objects.commands import Commands
+from studio_ui.objects.magnet import Magnet
+from studio_ui.objects.rooms import Rooms
+from studio_ui.palette.palette import Palette, menu_entries
+from studio_ui.palette.scene_entries import scene_entries
 from studio_ui.panels.all import all_panels
 from studio_ui.panels.console import ConsoleDoor
+from studio_ui.panels.environment_shelf import EnvironmentShelf
 from studio_ui.panels.panel import Panel, stacked
 from studio_ui.pictures.feature import PictureOut
 from studio_ui.plugins.watch import BackendWatch
 from studio_ui.preferences.effects import Effects
 from studio_ui.preferences.feature import PreferencesFeature
 from studio_ui.preferences.store import Preferences
-from studio_ui.project_files import ProjectFiles
 from studio_ui.quality import QualityControl
-from studio_ui.rooms import Rooms
 from studio_ui.settings import Settings
 from studio_ui.shortcuts import Shortcuts
 from studio_ui.status import StatusBar
 from studio_ui.toolbar import Toolbar
-from studio_ui.transfer import Transfer
-from studio_ui.view_aids import ViewAids
-from studio_ui.view_controls import ViewControls
-from studio_ui.viewing import Viewing
+from studio_ui.views.aids import ViewAids
+from studio_ui.views.camera_pictures import CameraPictures
+from studio_ui.views.cameras import Cameras
+from studio_ui.views.controls import ViewControls
+from studio_ui.views.viewing import Viewing
 
 _AUTOSAVE_MS = 500
 

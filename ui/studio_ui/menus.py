@@ -10,10 +10,10 @@ from PySide6.QtGui import QAction, QIcon, QPixmap
 from PySide6.QtWidgets import QDockWidget, QMenu, QMenuBar
 
 from studio_ui.actions.action_set import ActionSet
-from studio_ui.cameras import Cameras
 from studio_ui.canvas.framing import CAMERA_KEYS
+from studio_ui.files.project_files import ProjectFiles
 from studio_ui.files.recent import folder_text, shared_names
-from studio_ui.project_files import ProjectFiles
+from studio_ui.views.cameras import Cameras
 
 
 class Menus:

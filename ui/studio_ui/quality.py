@@ -8,8 +8,8 @@ from PySide6.QtWidgets import QHBoxLayout, QLabel, QSizePolicy, QWidget
 from studio_core.errors import PluginError
 from studio_core.params import ParamInfo, defaults, param_infos
 from studio_ui.context import Context, Subscriptions
-from studio_ui.fields import Slider
-from studio_ui.theme import GAP
+from studio_ui.forms.fields import Slider
+from studio_ui.look.theme import GAP
 
 NAME = "quality"
 """The parameter by which a backend offers this control: a number from 0 (faster) to 1 (truer)."""

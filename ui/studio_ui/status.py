@@ -13,9 +13,9 @@ from studio_core.scene.nodes import Scene
 from studio_core.shading.artifacts import MeasuredError
 from studio_ui.canvas.viewport import Probe
 from studio_ui.feed import Freshness, Shown
-from studio_ui.fitting import show_what_fits
+from studio_ui.forms.number_style import number_style
 from studio_ui.journal import Entry
-from studio_ui.number_style import number_style
+from studio_ui.look.fitting import show_what_fits
 
 _SHOWN_MS = 9000
 _GAP = 6  # pixels that Qt leaves between the parts

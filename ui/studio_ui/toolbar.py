@@ -5,8 +5,8 @@ from __future__ import annotations
 from PySide6.QtWidgets import QSizePolicy, QToolBar, QToolButton, QWidget
 
 from studio_ui.actions.action_set import ActionSet
-from studio_ui.icons import icon
-from studio_ui.theme import Theme
+from studio_ui.look.icons import icon
+from studio_ui.look.theme import Theme
 
 
 class Toolbar(QToolBar):

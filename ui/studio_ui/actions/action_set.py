@@ -11,9 +11,9 @@ from PySide6.QtWidgets import QMenu, QMenuBar, QToolBar, QWidget
 from studio_ui.actions.catalogue import ACTIONS, specs
 from studio_ui.actions.spec import REASONS, ActionSpec
 from studio_ui.features import Condition, Handler
-from studio_ui.icons import icon
+from studio_ui.look.icons import icon
+from studio_ui.look.theme import Theme
 from studio_ui.shortcuts import Shortcuts
-from studio_ui.theme import Theme
 
 
 class ActionSet:

@@ -21,7 +21,7 @@ from studio_ui.canvas.overlay_painter import paint_badge, paint_message, paint_o
 from studio_ui.canvas.projection import eye_of, project, ray
 from studio_ui.canvas.viewport import Probe
 from studio_ui.feed import Freshness
-from studio_ui.theme import DARK, Theme
+from studio_ui.look.theme import DARK, Theme
 
 NO_VIEW = View()
 

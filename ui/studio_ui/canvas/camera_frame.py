@@ -7,7 +7,7 @@ from PySide6.QtGui import QColor, QPainter, QPainterPath, QPaintEvent, QPen
 from PySide6.QtWidgets import QWidget
 
 from studio_ui.canvas.framing import frame_in
-from studio_ui.theme import DARK, Theme
+from studio_ui.look.theme import DARK, Theme
 
 _OUTSIDE = QColor(0, 0, 0, 90)
 _LINE = QColor(255, 255, 255, 190)

@@ -10,7 +10,7 @@ from studio_core.session import View
 from studio_ui.canvas.overlay import Band, Dot, Face, Label, Overlay, Wires
 from studio_ui.canvas.projection import project, project_segments
 from studio_ui.feed import Freshness
-from studio_ui.theme import Theme
+from studio_ui.look.theme import Theme
 
 LINE = "#f2f2f0"
 _RIM = QColor(0, 0, 0, 120)

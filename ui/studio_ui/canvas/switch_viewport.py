@@ -19,7 +19,7 @@ from studio_ui.canvas.glyphs import Glyph
 from studio_ui.canvas.overlay import NOTHING, Overlay
 from studio_ui.canvas.viewport import Pointer, Probe, Viewport
 from studio_ui.feed import Freshness
-from studio_ui.theme import Theme
+from studio_ui.look.theme import Theme
 
 _SIGNALS = ("pointer", "wheel", "scroll", "pinch", "key", "left", "resized")
 

@@ -30,8 +30,8 @@ from studio_ui.canvas.selecting import Selecting
 from studio_ui.canvas.viewport import Pointer, Viewport
 from studio_ui.editing import Editing
 from studio_ui.feed import PictureFeed
-from studio_ui.magnet import Magnet
-from studio_ui.number_style import number_style
+from studio_ui.forms.number_style import number_style
+from studio_ui.objects.magnet import Magnet
 
 CLICK = 4.0  # logical pixels that a click may slip
 TOOLS = ("select", "move", "rotate", "scale")

@@ -22,7 +22,7 @@ from studio_core.session import View
 from studio_core.signal import Signal
 from studio_ui.canvas.cube_shape import Face, Way, faces, field_at, flat, spoken
 from studio_ui.canvas.projection import axes_of
-from studio_ui.theme import DARK, Theme
+from studio_ui.look.theme import DARK, Theme
 
 SIZE = QSize(126, 122)
 _HALF = 25.0  # logical pixels of half the cube's side

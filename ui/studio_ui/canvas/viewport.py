@@ -19,7 +19,7 @@ from studio_core.signal import Signal
 from studio_ui.canvas.glyphs import Glyph
 from studio_ui.canvas.overlay import NOTHING, Overlay
 from studio_ui.feed import Freshness
-from studio_ui.theme import Theme
+from studio_ui.look.theme import Theme
 
 Button = Literal["left", "middle", "right", "none"]
 GRID = (0.62, 0.64, 0.68)

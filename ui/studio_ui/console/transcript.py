@@ -8,7 +8,7 @@ from typing import Literal
 from PySide6.QtGui import QColor, QFontDatabase, QTextCharFormat, QTextCursor
 from PySide6.QtWidgets import QPlainTextEdit
 
-from studio_ui.theme import DARK, Theme
+from studio_ui.look.theme import DARK, Theme
 
 Role = Literal["command", "output", "error", "note"]
 LINES, PIECES = 5_000, 20_000

@@ -8,8 +8,8 @@ from PySide6.QtCore import QPointF, QRectF, QSize, Qt
 from PySide6.QtGui import QColor, QImage, QPainter, QPainterPath, QPaintEvent, QPen, QResizeEvent
 from PySide6.QtWidgets import QAbstractButton, QToolButton, QWidget
 
-from studio_ui.icons import icon
-from studio_ui.theme import DARK, Theme
+from studio_ui.look.icons import icon
+from studio_ui.look.theme import DARK, Theme
 
 WIDTH, PICTURE = 196, 110
 _PAD, _GAP, _RADIUS = 8, 14, 6

@@ -9,8 +9,8 @@ from pathlib import Path
 from PySide6.QtCore import QMimeData
 from PySide6.QtGui import QImageReader
 
-from studio_ui.material_drag import MIME
-from studio_ui.project_files import SUFFIX
+from studio_ui.files.project_files import SUFFIX
+from studio_ui.objects.material_drag import MIME
 
 HDR = (".exr", ".hdr", ".tif", ".tiff")
 PHOTOGRAPHS = (".png", ".jpg", ".jpeg", ".webp", ".bmp")

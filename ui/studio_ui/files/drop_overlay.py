@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QWidget
 from studio_core.session import View
 from studio_ui.canvas.projection import project
 from studio_ui.files.landing import Landing
-from studio_ui.theme import DARK, Theme
+from studio_ui.look.theme import DARK, Theme
 
 _RADIUS = 0.25  # metres of the ring on the surface
 _INSET = 6

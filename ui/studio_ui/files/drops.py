@@ -16,8 +16,8 @@ from studio_ui.files.drop_intent import Intent, intent, intent_of
 from studio_ui.files.drop_overlay import DropOverlay
 from studio_ui.files.importing import Importing
 from studio_ui.files.landing import Landing, landing
-from studio_ui.material_drag import dragged_material, drop_material
-from studio_ui.project_files import ProjectFiles
+from studio_ui.files.project_files import ProjectFiles
+from studio_ui.objects.material_drag import dragged_material, drop_material
 
 
 class Drops(QObject):

@@ -11,11 +11,11 @@ from studio_ui.canvas.layered import Layered
 from studio_ui.context import Context, Subscriptions
 from studio_ui.files.drop_overlay import DropOverlay
 from studio_ui.files.notice_bar import Notices
+from studio_ui.files.project_files import ProjectFiles
 from studio_ui.files.read_only_bar import ReadOnlyBar
 from studio_ui.files.start_page import Begin, StartPage
 from studio_ui.files.task_bar import TaskBar
-from studio_ui.project_files import ProjectFiles
-from studio_ui.theme import Theme
+from studio_ui.look.theme import Theme
 
 _CRASHED = "Lucarne ended unexpectedly last time. What it had kept of your work is offered by itself."
 

@@ -20,9 +20,9 @@ from studio_core.scene.imported import Up
 from studio_ui.files.import_preview import ImportPreview
 from studio_ui.files.import_question import UNITS, ImportChoice, ImportQuestion
 from studio_ui.files.leftovers import counted
-from studio_ui.number_style import number_style
+from studio_ui.forms.number_style import number_style
+from studio_ui.forms.spin import Spin
 from studio_ui.panels.panel import heading, note
-from studio_ui.spin import Spin
 
 _AXES: tuple[tuple[str, Up], ...] = (("Y is up", "y"), ("Z is up", "z"))
 _OTHER = "other"

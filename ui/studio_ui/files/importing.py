@@ -22,7 +22,6 @@ from studio_core.scene.transform import Transform, vec3
 from studio_core.shading.job import Job
 from studio_ui.ask import Ask, Filter
 from studio_ui.canvas.projection import bounds
-from studio_ui.choosing import meshes_below
 from studio_ui.context import Context
 from studio_ui.files.import_question import (
     ImportChoice,
@@ -33,6 +32,7 @@ from studio_ui.files.import_question import (
     some_lines,
 )
 from studio_ui.files.landing import F64, Landing, beside, placed_model
+from studio_ui.objects.choosing import meshes_below
 from studio_ui.settings import Settings
 
 _SETTING = "import"

@@ -17,8 +17,8 @@ from studio_core.shading.job import Job
 from studio_core.shading.scheduler import Executor
 from studio_core.signal import Signal
 from studio_ui.context import Context
+from studio_ui.files.session_form import session_form
 from studio_ui.files.thumbnails import Thumbnails
-from studio_ui.session_form import session_form
 
 _PICTURE_EVERY = 20.0  # seconds between pictures of a version that is autosaved
 

@@ -11,9 +11,9 @@ from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QPushButton, QSizePol
 
 from studio_ui.context import Subscriptions
 from studio_ui.files.report import ReportDialog, report_text
-from studio_ui.icons import icon
 from studio_ui.journal import Entry, Journal
-from studio_ui.theme import DARK, Theme
+from studio_ui.look.icons import icon
+from studio_ui.look.theme import DARK, Theme
 
 _WIDEST = 760
 _MOST = 3

@@ -7,8 +7,8 @@ import time
 from studio_ui.context import Subscriptions
 from studio_ui.files.notice_bar import Bar
 from studio_ui.files.opening import ReadOnly
+from studio_ui.files.project_files import ProjectFiles
 from studio_ui.files.recent import when
-from studio_ui.project_files import ProjectFiles
 
 
 class ReadOnlyBar(Bar):

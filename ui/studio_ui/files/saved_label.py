@@ -8,7 +8,7 @@ from PySide6.QtWidgets import QLabel
 
 from studio_ui.context import Subscriptions
 from studio_ui.files.keeper import Kept
-from studio_ui.project_files import ProjectFiles
+from studio_ui.files.project_files import ProjectFiles
 
 
 class SavedLabel(QLabel):

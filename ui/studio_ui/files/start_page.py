@@ -17,8 +17,8 @@ from studio_ui.context import Context, Subscriptions
 from studio_ui.files.cards import WIDTH, Card, Shelf
 from studio_ui.files.recent import RecentProjects, folder_text, when
 from studio_ui.files.thumbnails import read_small
-from studio_ui.icons import icon
-from studio_ui.theme import DARK, Theme
+from studio_ui.look.icons import icon
+from studio_ui.look.theme import DARK, Theme
 
 _COLUMNS = 4
 _SHOWN = 8

@@ -10,7 +10,7 @@ from studio_core.project.store import compact, save_copy_without_history
 from studio_core.shading.job import Job
 from studio_ui.ask import Ask
 from studio_ui.context import Context
-from studio_ui.project_files import ProjectFiles
+from studio_ui.files.project_files import ProjectFiles
 
 _MOST = 200  # versions that are listed
 

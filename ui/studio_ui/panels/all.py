@@ -7,12 +7,10 @@ from collections.abc import Callable
 from PySide6.QtCore import Qt
 
 from studio_ui.ask import Ask
-from studio_ui.camera_pictures import CameraPictures
-from studio_ui.cameras import Cameras
 from studio_ui.context import Context
-from studio_ui.environment_shelf import EnvironmentShelf
 from studio_ui.panels.cameras import CamerasPanel
 from studio_ui.panels.console import ConsolePanel
+from studio_ui.panels.environment_shelf import EnvironmentShelf
 from studio_ui.panels.history import HistoryPanel
 from studio_ui.panels.jobs import JobsPanel
 from studio_ui.panels.lighting import LightingPanel
@@ -24,6 +22,8 @@ from studio_ui.panels.properties import PropertiesPanel
 from studio_ui.panels.shading import ShadingPanel
 from studio_ui.plugins.panel import plugin_panels
 from studio_ui.settings import Settings
+from studio_ui.views.camera_pictures import CameraPictures
+from studio_ui.views.cameras import Cameras
 
 
 def all_panels(

@@ -17,7 +17,7 @@ from PySide6.QtWidgets import (
 )
 
 from studio_core.scene.nodes import NodeId
-from studio_ui.theme import DARK, Theme
+from studio_ui.look.theme import DARK, Theme
 
 PICTURE = QSize(96, 54)
 """Logical pixels that a small picture has at most."""

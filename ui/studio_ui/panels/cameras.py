@@ -11,17 +11,17 @@ from PySide6.QtWidgets import QMenu
 from studio_core.edits import Edit, Order, Remove, SetFields
 from studio_core.params import Value
 from studio_core.scene.nodes import Camera, NodeId
-from studio_ui.camera_pictures import CameraPictures
-from studio_ui.cameras import Cameras
 from studio_ui.canvas.framing import ASPECTS
 from studio_ui.context import Context
-from studio_ui.fields import Combo
+from studio_ui.forms.fields import Combo
+from studio_ui.forms.sinks import EditSink
+from studio_ui.look.theme import Theme
 from studio_ui.panels.camera_list import CameraList
 from studio_ui.panels.lens_row import LensRow
 from studio_ui.panels.light_fields import to_lens
 from studio_ui.panels.panel import Panel, note, row
-from studio_ui.sinks import EditSink
-from studio_ui.theme import Theme
+from studio_ui.views.camera_pictures import CameraPictures
+from studio_ui.views.cameras import Cameras
 
 _EMPTY = "No cameras yet. Look around until you like what you see, then press Ctrl+Alt+0 to keep the view."
 

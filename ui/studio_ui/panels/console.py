@@ -26,9 +26,9 @@ from studio_ui.console.editor import CommandEditor, History
 from studio_ui.console.running import Running
 from studio_ui.console.transcript import Transcript
 from studio_ui.context import Context
+from studio_ui.look.theme import Theme
 from studio_ui.panels.panel import Panel
 from studio_ui.settings import Settings
-from studio_ui.theme import Theme
 
 SCRIPTS = Filter("Python scripts", (".py",))
 _HISTORY, _TELLING = "console_history", "console_telling"

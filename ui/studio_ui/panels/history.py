@@ -7,9 +7,9 @@ from PySide6.QtGui import QColor, QIcon, QPixmap
 from PySide6.QtWidgets import QListWidget, QListWidgetItem
 
 from studio_ui.context import Context
-from studio_ui.icons import icon
+from studio_ui.look.icons import icon
+from studio_ui.look.theme import Theme
 from studio_ui.panels.panel import Panel, note
-from studio_ui.theme import Theme
 
 _FIRST = {"Open": "As it was opened", "New": "Empty project"}
 _ICON = QSize(13, 13)

@@ -6,10 +6,10 @@ from PySide6.QtWidgets import QHBoxLayout, QWidget
 
 from studio_core.params import ParamInfo, param_infos
 from studio_core.scene.nodes import Camera
+from studio_ui.forms.sinks import Sink
+from studio_ui.forms.spin import ScrubLabel, Spin
+from studio_ui.look.theme import GAP
 from studio_ui.panels.light_fields import to_fov, to_lens
-from studio_ui.sinks import Sink
-from studio_ui.spin import ScrubLabel, Spin
-from studio_ui.theme import GAP
 
 _ANGLE = param_infos(Camera)["fov"]
 _LENS = ParamInfo(

@@ -12,13 +12,13 @@ from PySide6.QtWidgets import QHBoxLayout, QLabel
 
 from studio_core.colour import kelvin
 from studio_core.params import ParamInfo
-from studio_ui.colour_button import to_display
-from studio_ui.fields import Field, NumberField, Slider
+from studio_ui.forms.colour_button import to_display
+from studio_ui.forms.fields import Field, NumberField, Slider
+from studio_ui.forms.sinks import Sink
+from studio_ui.forms.spin import MIXED, Spin
+from studio_ui.look.theme import GAP
 from studio_ui.panels.dial import Dial
 from studio_ui.panels.light_hints import kelvin_words, to_ev
-from studio_ui.sinks import Sink
-from studio_ui.spin import MIXED, Spin
-from studio_ui.theme import GAP
 
 _EV = ParamInfo("number", "Intensity in EV", "One more is twice the light", unit="EV", low=-32, high=32)
 _LENS = ParamInfo(

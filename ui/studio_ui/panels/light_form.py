@@ -7,11 +7,11 @@ from typing import Any
 
 from studio_core.params import ParamInfo, defaults
 from studio_core.scene.nodes import Environment, Light, Node, Scene
-from studio_ui.fields import Field
+from studio_ui.forms.fields import Field
+from studio_ui.forms.param_form import ParamForm
+from studio_ui.forms.sinks import Sink
 from studio_ui.panels.light_fields import DirectionField, IntensityField, KelvinField, LensField
 from studio_ui.panels.light_hints import calibration, light_hint
-from studio_ui.param_form import ParamForm
-from studio_ui.sinks import Sink
 
 SPECIAL: Mapping[str, type[Field]] = {
     "intensity": IntensityField,

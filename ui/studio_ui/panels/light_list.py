@@ -8,9 +8,9 @@ from PySide6.QtCore import QItemSelectionModel, QSignalBlocker, QSize, Qt
 from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QTreeWidget, QTreeWidgetItem
 
 from studio_core.scene.nodes import Light, NodeId
-from studio_ui.icons import icon
+from studio_ui.look.icons import icon
+from studio_ui.look.theme import Theme
 from studio_ui.panels.node_kinds import kind_icon
-from studio_ui.theme import Theme
 
 _NAME, _SOLO = 0, 1
 _ROW = 28  # pixels

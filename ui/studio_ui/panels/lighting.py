@@ -14,8 +14,9 @@ from studio_core.edits import Add, Compound, Remove, SetFields, duplicate
 from studio_core.scene.diff import Changes
 from studio_core.scene.nodes import Environment, Light, NodeId, Scene, new_id
 from studio_ui.context import Context
-from studio_ui.environment_shelf import EnvironmentShelf
-from studio_ui.node_sink import NodeSink
+from studio_ui.forms.node_sink import NodeSink
+from studio_ui.look.theme import Theme
+from studio_ui.panels.environment_shelf import EnvironmentShelf
 from studio_ui.panels.lamps import LAMPS
 from studio_ui.panels.light_form import NodeForm
 from studio_ui.panels.light_list import LightList
@@ -23,7 +24,6 @@ from studio_ui.panels.node_kinds import kinds_name
 from studio_ui.panels.panel import Panel, clear, heading, note, row
 from studio_ui.panels.properties import shared_infos
 from studio_ui.panels.shelf_list import ShelfList
-from studio_ui.theme import Theme
 
 
 class LightingPanel(Panel):

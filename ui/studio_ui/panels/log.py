@@ -19,8 +19,8 @@ from PySide6.QtWidgets import (
 from studio_ui.context import Context
 from studio_ui.files.report import copy_text, report_text
 from studio_ui.journal import Entry, Level
+from studio_ui.look.theme import Theme
 from studio_ui.panels.panel import Panel, row
-from studio_ui.theme import Theme
 
 _ROLE = Qt.ItemDataRole.UserRole
 _LEVELS: dict[Level, str] = {"note": "Notes", "warning": "Warnings", "problem": "Problems"}

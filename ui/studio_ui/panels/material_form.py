@@ -16,13 +16,13 @@ from studio_core.scene.geometry import Image, Texture
 from studio_core.scene.nodes import Material, MaterialId
 from studio_core.shading.job import Job
 from studio_ui.context import Context
-from studio_ui.fields import Combo
+from studio_ui.forms.fields import Combo
+from studio_ui.forms.param_form import ParamForm, form_label, form_layout
+from studio_ui.forms.sinks import EditSink
+from studio_ui.forms.spin import MIXED
+from studio_ui.look.theme import GAP
 from studio_ui.panels.panel import clear, note
 from studio_ui.panels.texture_row import TextureRow
-from studio_ui.param_form import ParamForm, form_label, form_layout
-from studio_ui.sinks import EditSink
-from studio_ui.spin import MIXED
-from studio_ui.theme import GAP
 
 _COMMON: Mapping[str, ParamInfo] = param_infos(Material)
 PICTURES = "Pictures (*.png *.jpg *.jpeg *.exr *.hdr *.tif *.tiff)"

@@ -10,9 +10,9 @@ from PySide6.QtGui import QColor, QDrag
 from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QTreeWidget, QTreeWidgetItem
 
 from studio_core.scene.nodes import Material, MaterialId, MeshObject, Scene
-from studio_ui.material_drag import MIME, material_data
+from studio_ui.look.theme import DARK, Theme
+from studio_ui.objects.material_drag import MIME, material_data
 from studio_ui.panels.swatch import SIZE, swatch
-from studio_ui.theme import DARK, Theme
 
 _NAME, _USERS = 0, 1
 _ROLE = Qt.ItemDataRole.UserRole

@@ -11,15 +11,15 @@ from PySide6.QtWidgets import QLineEdit, QMenu, QPushButton, QSplitter, QToolBut
 from studio_core.edits import AddMaterial, Compound, RemoveMaterial, SetMaterial
 from studio_core.scene.diff import Aspect, Changes
 from studio_core.scene.nodes import Material, MaterialId, MeshObject, Scene, new_id
-from studio_ui.choosing import meshes_below, users
 from studio_ui.context import Context
-from studio_ui.fields import Combo
-from studio_ui.material_drag import assigned
+from studio_ui.forms.fields import Combo
+from studio_ui.forms.param_form import ParamForm
+from studio_ui.look.theme import Theme
+from studio_ui.objects.choosing import meshes_below, users
+from studio_ui.objects.material_drag import assigned
 from studio_ui.panels.material_form import MaterialForm
 from studio_ui.panels.material_list import MaterialList, users_of
 from studio_ui.panels.panel import Panel, row
-from studio_ui.param_form import ParamForm
-from studio_ui.theme import Theme
 
 _WHAT_CHANGES_USERS = Aspect.STRUCTURE | Aspect.MATERIAL
 

@@ -21,13 +21,13 @@ from studio_core.edits import Compound, Edit, SetFields
 from studio_core.scene.diff import Changes
 from studio_core.scene.nodes import NodeId, Scene
 from studio_ui.context import Context
-from studio_ui.fields import Combo
+from studio_ui.forms.fields import Combo
+from studio_ui.look.theme import Theme
 from studio_ui.panels.node_kinds import FILTERS
 from studio_ui.panels.outliner_filter import OutlinerFilter
 from studio_ui.panels.outliner_model import FIELDS, NAME, OutlinerModel
 from studio_ui.panels.outliner_tree import OutlinerTree
 from studio_ui.panels.panel import Panel, row
-from studio_ui.theme import Theme
 
 _VERBS = {"hidden": ("Show", "Hide"), "locked": ("Unlock", "Lock")}
 _MENU = (

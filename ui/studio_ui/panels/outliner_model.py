@@ -12,10 +12,10 @@ from studio_core.edits import Compound, Edit, Order, Reparent, SetFields
 from studio_core.scene.diff import Aspect, Changes
 from studio_core.scene.nodes import Camera, Environment, Node, NodeId, Scene
 from studio_ui.editing import Editing
-from studio_ui.icons import icon
-from studio_ui.material_drag import assigned, dragged_material
+from studio_ui.look.icons import icon
+from studio_ui.look.theme import DARK, Theme
+from studio_ui.objects.material_drag import assigned, dragged_material
 from studio_ui.panels.node_kinds import kind_icon, kind_name
-from studio_ui.theme import DARK, Theme
 
 Index = QModelIndex | QPersistentModelIndex
 NAME, EYE, LOCK = range(3)

@@ -10,8 +10,8 @@ from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QScrollArea, QToolBut
 from shiboken6 import isValid
 
 from studio_ui.context import Context, Subscriptions
-from studio_ui.icons import icon
-from studio_ui.theme import DARK, GAP, Theme
+from studio_ui.look.icons import icon
+from studio_ui.look.theme import DARK, GAP, Theme
 
 
 class Panel(QWidget):

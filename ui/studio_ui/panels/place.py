@@ -16,12 +16,12 @@ from studio_core.scene.size import own_size, pivot_words, resized
 from studio_core.scene.transform import IDENTITY, Transform, Vec3
 from studio_ui.canvas.drags import named
 from studio_ui.context import Context
-from studio_ui.euler import from_euler, to_euler
-from studio_ui.number_style import number_style
+from studio_ui.forms.euler import from_euler, to_euler
+from studio_ui.forms.number_style import number_style
+from studio_ui.forms.param_form import form_label_like, form_layout
+from studio_ui.forms.reset_button import ResetButton, beside
+from studio_ui.forms.spin import Spin
 from studio_ui.panels.panel import note
-from studio_ui.param_form import form_label_like, form_layout
-from studio_ui.reset_button import ResetButton, beside
-from studio_ui.spin import Spin
 
 _POSITION = ParamInfo(
     "number", "Position", "Where its pivot is, from its group's pivot", unit="m", low=-1e6, high=1e6

@@ -11,15 +11,15 @@ from studio_core.scene.diff import Changes
 from studio_core.scene.nodes import Environment, MaterialId, MeshObject, Node, NodeId, Scene
 from studio_core.scene.room import SLOTS, Room
 from studio_ui.context import Context
-from studio_ui.fields import Combo
-from studio_ui.node_sink import NodeSink
+from studio_ui.forms.fields import Combo
+from studio_ui.forms.node_sink import NodeSink
+from studio_ui.forms.param_form import ParamForm, form_label, form_layout
+from studio_ui.forms.spin import MIXED
 from studio_ui.panels.light_form import NodeForm, shared_values
 from studio_ui.panels.node_kinds import kinds_name
 from studio_ui.panels.panel import Panel, clear, heading, note
 from studio_ui.panels.place import PlaceEditor
 from studio_ui.panels.room_form import RoomForm
-from studio_ui.param_form import ParamForm, form_label, form_layout
-from studio_ui.spin import MIXED
 
 _FLAGS = ("hidden", "locked")
 _MOST = 200  # things whose values are compared; of more, the first ones

@@ -22,13 +22,13 @@ from studio_core.scene.nodes import NodeId
 from studio_core.scene.room import Room
 from studio_core.scene.room_shape import KINDS, Opening
 from studio_ui.editing import Editing
-from studio_ui.fields import Combo
-from studio_ui.number_style import NumberStyle, number_style
+from studio_ui.forms.fields import Combo
+from studio_ui.forms.number_style import NumberStyle, number_style
+from studio_ui.forms.param_form import ParamForm, form_label, form_layout
+from studio_ui.forms.sinks import EditSink
+from studio_ui.look.theme import GAP
 from studio_ui.panels.panel import heading, note, row
 from studio_ui.panels.room_plan import PlanForm
-from studio_ui.param_form import ParamForm, form_label, form_layout
-from studio_ui.sinks import EditSink
-from studio_ui.theme import GAP
 
 NAMES = {"window": "Window", "door": "Door", "opening": "Passage"}
 NEW = {

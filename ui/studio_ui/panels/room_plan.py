@@ -13,10 +13,10 @@ from studio_core.scene.room import Room
 from studio_core.scene.room_plans import CORNERS, carried, l_cut, l_plan
 from studio_core.scene.room_shape import FARTHEST, Point, rectangle
 from studio_ui.editing import Editing
-from studio_ui.fields import Combo
-from studio_ui.param_form import ParamForm, form_label, form_layout
-from studio_ui.sinks import EditSink
-from studio_ui.theme import GAP
+from studio_ui.forms.fields import Combo
+from studio_ui.forms.param_form import ParamForm, form_label, form_layout
+from studio_ui.forms.sinks import EditSink
+from studio_ui.look.theme import GAP
 
 _LEAST = 0.3  # metres that a cut and what is left of a side have at least
 _SHARE = 0.4  # of a side that is cut from a new L

@@ -11,11 +11,11 @@ from studio_core.contract import ShadingBackend
 from studio_core.errors import PluginError
 from studio_core.params import Value, defaults, param_infos
 from studio_ui.context import Context
-from studio_ui.fields import Combo, tip
+from studio_ui.forms.fields import Combo, tip
+from studio_ui.forms.param_form import ParamForm, form_label, form_layout
+from studio_ui.forms.sinks import PlainSink
 from studio_ui.panels.panel import Panel, clear, note
-from studio_ui.param_form import ParamForm, form_label, form_layout
 from studio_ui.quality import NAME, QualityControl, offers_quality
-from studio_ui.sinks import PlainSink
 
 
 class ShadingPanel(Panel):

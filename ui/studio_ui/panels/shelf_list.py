@@ -6,8 +6,8 @@ from PySide6.QtCore import QPoint, QSignalBlocker, QSize, Qt
 from PySide6.QtGui import QColor, QIcon, QPainter, QPen, QPixmap, QResizeEvent
 from PySide6.QtWidgets import QListView, QListWidget, QListWidgetItem, QMenu
 
-from studio_ui.environment_shelf import Entry, EnvironmentShelf
-from studio_ui.theme import DARK, Theme
+from studio_ui.look.theme import DARK, Theme
+from studio_ui.panels.environment_shelf import Entry, EnvironmentShelf
 
 _ICON = QSize(108, 54)
 _GRID = QSize(118, 80)

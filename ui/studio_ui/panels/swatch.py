@@ -6,7 +6,7 @@ from PySide6.QtCore import QPointF, QRectF, Qt
 from PySide6.QtGui import QColor, QIcon, QPainter, QPixmap, QRadialGradient
 
 from studio_core.scene.nodes import Material
-from studio_ui.colour_button import to_display
+from studio_ui.forms.colour_button import to_display
 
 SIZE = 26
 _COLOURS = ("base_color", "color", "diffuse", "albedo", "reflectance")

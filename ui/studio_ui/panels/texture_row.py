@@ -12,8 +12,8 @@ from PySide6.QtWidgets import QLabel, QToolButton, QVBoxLayout, QWidget
 
 from studio_core.params import ParamInfo
 from studio_core.scene.geometry import Image, Texture
+from studio_ui.forms.spin import Spin
 from studio_ui.panels.panel import row
-from studio_ui.spin import Spin
 
 _REPEAT = ParamInfo(
     "number", "Repeat", "How often the picture is repeated over the surface's own unit", unit="×", low=0.01,

@@ -20,10 +20,10 @@ from PySide6.QtWidgets import (
 )
 
 from studio_core.errors import Cancelled
+from studio_ui.look.theme import GAP
 from studio_ui.pictures.order import duration
 from studio_ui.pictures.work import Order
 from studio_ui.tasks import Task
-from studio_ui.theme import GAP
 
 _EVERY_MS = 200
 FORM_WIDTH, SCROLL_BAR = 380, 12

@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QCheckBox, QLineEdit, QToolButton, QWidget
 
 from studio_core.scene.nodes import Camera
 from studio_ui.ask import Filter
-from studio_ui.fields import Combo
+from studio_ui.forms.fields import Combo
 from studio_ui.panels.panel import row
 from studio_ui.pictures.dialog import PictureDialog
 from studio_ui.pictures.forms import LookForm, SizeForm, form_in, labelled, named

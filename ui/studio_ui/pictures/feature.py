@@ -19,7 +19,6 @@ from studio_core.session import View
 from studio_core.shading.job import Job
 from studio_core.shading.scheduler import ComputeThread, Executor
 from studio_ui.ask import Ask
-from studio_ui.cameras import Cameras
 from studio_ui.canvas.framing import frame_in
 from studio_ui.context import Context
 from studio_ui.feed import Freshness
@@ -34,6 +33,7 @@ from studio_ui.pictures.series_dialog import SeriesDialog
 from studio_ui.pictures.work import Order, make, unused
 from studio_ui.settings import Settings
 from studio_ui.tasks import Task
+from studio_ui.views.cameras import Cameras
 
 
 class _Relay(QObject):

@@ -8,11 +8,11 @@ from PySide6.QtCore import QSignalBlocker, Signal
 from PySide6.QtWidgets import QCheckBox, QFormLayout, QHBoxLayout, QLabel, QVBoxLayout, QWidget
 
 from studio_core.params import ParamInfo
-from studio_ui.fields import Combo
+from studio_ui.forms.fields import Combo
+from studio_ui.forms.spin import Spin
+from studio_ui.look.theme import GAP
 from studio_ui.panels.panel import note
 from studio_ui.pictures.order import KINDS, MOST_PIXELS, PRESETS, QUALITIES, SAMPLES, Kind, Size
-from studio_ui.spin import Spin
-from studio_ui.theme import GAP
 
 _WINDOW, _CUSTOM = "As the window", "Other"
 

@@ -21,13 +21,13 @@ from studio_core.params import ParamInfo
 from studio_core.scene.bounds import exact_bounds
 from studio_core.scene.nodes import Camera
 from studio_core.scene.transform import Vec3, vec3
-from studio_ui.fields import Combo
+from studio_ui.forms.fields import Combo
+from studio_ui.forms.spin import Spin
 from studio_ui.panels.panel import note, row
 from studio_ui.pictures.dialog import PictureDialog
 from studio_ui.pictures.forms import LookForm, SizeForm, form_in, labelled, named
 from studio_ui.pictures.order import HERE, SeriesOrder, duration, guessed
 from studio_ui.pictures.work import unused
-from studio_ui.spin import Spin
 
 if TYPE_CHECKING:
     from studio_ui.pictures.feature import PictureOut

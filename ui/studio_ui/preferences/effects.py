@@ -6,11 +6,11 @@ from collections.abc import Callable
 from typing import Any
 
 from studio_ui.context import Context
+from studio_ui.files.project_files import ProjectFiles
 from studio_ui.preferences.catalogue import ALL
 from studio_ui.preferences.store import Preferences
-from studio_ui.project_files import ProjectFiles
 from studio_ui.quality import QualityControl
-from studio_ui.viewing import Viewing
+from studio_ui.views.viewing import Viewing
 
 
 class Effects:

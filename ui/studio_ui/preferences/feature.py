@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 
 from PySide6.QtWidgets import QWidget
 
-from studio_ui.number_style import NumberStyle, set_number_style
-from studio_ui.palette import Entry
+from studio_ui.forms.number_style import NumberStyle, set_number_style
+from studio_ui.palette.palette import Entry
 from studio_ui.preferences.catalogue import ALL, KEYS, SYSTEM
 from studio_ui.preferences.store import Preferences
 from studio_ui.shortcuts import Shortcuts

@@ -17,8 +17,8 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from studio_ui import fuzzy
 from studio_ui.actions.catalogue import specs
+from studio_ui.palette import fuzzy
 from studio_ui.shortcuts import Shortcuts, portable, shown
 
 _ID = Qt.ItemDataRole.UserRole

@@ -8,13 +8,13 @@ from typing import Any
 from PySide6.QtCore import QSignalBlocker, Qt
 from PySide6.QtWidgets import QLabel, QSizePolicy, QVBoxLayout, QWidget
 
-from studio_ui.fields import FIELDS, Combo, Field
+from studio_ui.forms.fields import FIELDS, Combo, Field
+from studio_ui.forms.param_form import form_label, form_layout
+from studio_ui.forms.reset_button import ResetButton, beside
+from studio_ui.forms.sinks import PlainSink, Sink
 from studio_ui.panels.panel import note
-from studio_ui.param_form import form_label, form_layout
 from studio_ui.preferences.catalogue import Preference
 from studio_ui.preferences.store import Preferences
-from studio_ui.reset_button import ResetButton, beside
-from studio_ui.sinks import PlainSink, Sink
 
 _LABEL, _FIELD = 170, 300
 _TOP = 5  # pixels above a label, so that it stands beside its field

@@ -9,7 +9,7 @@ from PySide6.QtGui import QColor, QFont, QPainter, QPalette
 from PySide6.QtWidgets import QListView, QStyle, QStyledItemDelegate, QStyleOptionViewItem
 
 if TYPE_CHECKING:
-    from studio_ui.palette import Entry
+    from studio_ui.palette.palette import Entry
 
 _PAD, _GAP = 8, 12
 

@@ -21,8 +21,8 @@ from studio_ui.files.keeper import Keeper
 from studio_ui.files.leftovers import Leftover, beside, never_saved
 from studio_ui.files.opening import Opened, ReadOnly, forget, locked, read
 from studio_ui.files.recent import RecentProjects
+from studio_ui.files.session_form import session_form, take_session
 from studio_ui.files.thumbnails import Thumbnails
-from studio_ui.session_form import session_form, take_session
 from studio_ui.settings import Settings
 
 SUFFIX = ".lucarne"

@@ -13,7 +13,7 @@ from studio_core.shading.job import Job
 from studio_core.signal import Signal
 from studio_ui.ask import Ask, Filter
 from studio_ui.context import Context
-from studio_ui.environment_shelf import set_environment
+from studio_ui.panels.environment_shelf import set_environment
 
 ENVIRONMENTS = Filter("Pictures of light", (".exr", ".hdr", ".tif", ".tiff", ".png", ".jpg", ".jpeg"))
 

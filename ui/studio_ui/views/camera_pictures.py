@@ -12,11 +12,11 @@ from PySide6.QtGui import QImage
 from studio_core.scene.nodes import Camera, NodeId, Scene
 from studio_core.shading.job import Job
 from studio_core.signal import Signal
-from studio_ui.cameras import Cameras, same
 from studio_ui.canvas.framing import frame_in
 from studio_ui.context import Context, Subscriptions
 from studio_ui.feed import Shown
 from studio_ui.files.thumbnails import read_small, small_picture
+from studio_ui.views.cameras import Cameras, same
 
 _MOST = 400  # files in the folder
 

@@ -15,8 +15,8 @@ from studio_core.scene.transform import Transform
 from studio_core.session import View
 from studio_ui.canvas.projection import F64, eye_of, ray
 from studio_ui.canvas.viewport import Probe
-from studio_ui.choosing import meshes_below
 from studio_ui.context import Context
+from studio_ui.objects.choosing import meshes_below
 
 MIME = "application/x-lucarne-material"
 

@@ -7,11 +7,11 @@ from PySide6.QtWidgets import QHBoxLayout, QLabel, QWidget
 
 from studio_core.kernels.tonemap import KINDS, LABELS
 from studio_core.params import ParamInfo
-from studio_ui.cameras import Cameras
 from studio_ui.context import Context, Subscriptions
-from studio_ui.fields import Combo, NumberField
-from studio_ui.sinks import Sink
-from studio_ui.theme import GAP
+from studio_ui.forms.fields import Combo, NumberField
+from studio_ui.forms.sinks import Sink
+from studio_ui.look.theme import GAP
+from studio_ui.views.cameras import Cameras
 
 _EXPOSURE = ParamInfo("number", "Exposure", "How bright the picture is shown", unit="EV", low=-16, high=16)
 _FREE = "Free view"

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from PySide6.QtCore import QEvent, QSize, Qt
 from PySide6.QtWidgets import QHBoxLayout, QToolButton, QWidget
 
-from studio_ui.icons import icon
+from studio_ui.look.icons import icon
 
 _SIZE = 20  # pixels
 

@@ -9,12 +9,12 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QFormLayout, QLabel, QToolButton, QWidget
 
 from studio_core.params import ParamInfo, Value
-from studio_ui.fields import FIELDS, Field, NumberField, tip
+from studio_ui.forms.fields import FIELDS, Field, NumberField, tip
+from studio_ui.forms.reset_button import ResetButton, beside
+from studio_ui.forms.sinks import Sink
+from studio_ui.forms.spin import ScrubLabel
+from studio_ui.look.theme import GAP
 from studio_ui.panels.panel import heading
-from studio_ui.reset_button import ResetButton, beside
-from studio_ui.sinks import Sink
-from studio_ui.spin import ScrubLabel
-from studio_ui.theme import GAP
 
 _LABEL = 92  # pixels
 

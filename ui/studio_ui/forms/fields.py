@@ -20,10 +20,10 @@ from PySide6.QtWidgets import (
 )
 
 from studio_core.params import ParamInfo
-from studio_ui.colour_button import ColourButton
-from studio_ui.sinks import Sink
-from studio_ui.spin import MIXED, Spin
-from studio_ui.theme import GAP
+from studio_ui.forms.colour_button import ColourButton
+from studio_ui.forms.sinks import Sink
+from studio_ui.forms.spin import MIXED, Spin
+from studio_ui.look.theme import GAP
 
 _STEPS = 1000
 

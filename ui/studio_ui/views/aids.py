@@ -6,18 +6,18 @@ from collections.abc import Callable
 
 from PySide6.QtCore import QPoint, QRect
 
-from studio_ui.cameras import Cameras
 from studio_ui.canvas.camera_frame import CameraFrame
 from studio_ui.canvas.looking import Looking
 from studio_ui.canvas.switch_viewport import SwitchViewport
 from studio_ui.canvas.view_cube import SIZE, ViewCube
 from studio_ui.canvas.viewport import Pointer
 from studio_ui.context import Context, Subscriptions
-from studio_ui.main_light import MainLight
+from studio_ui.look.theme import Theme
 from studio_ui.panels.light_fields import to_lens
 from studio_ui.settings import Settings
-from studio_ui.theme import Theme
-from studio_ui.viewing import Viewing
+from studio_ui.views.cameras import Cameras
+from studio_ui.views.main_light import MainLight
+from studio_ui.views.viewing import Viewing
 
 _ACROSS = 420.0
 """Pixels that a drag on the cube goes for as much as one over the picture's height."""

@@ -14,7 +14,7 @@ from PySide6.QtWidgets import QApplication, QDoubleSpinBox, QLabel, QToolTip, QW
 
 from studio_core.errors import InputError
 from studio_core.params import ParamInfo
-from studio_ui.number_style import NumberStyle, number_style
+from studio_ui.forms.number_style import NumberStyle, number_style
 
 MIXED = "—"
 """Shown where several things are edited at once and differ."""

@@ -13,8 +13,8 @@ from PySide6.QtCore import QAbstractListModel, QEvent, QModelIndex, QObject, QPe
 from PySide6.QtGui import QAction, QKeyEvent
 from PySide6.QtWidgets import QFrame, QLabel, QLineEdit, QListView, QMainWindow, QMenu, QMenuBar, QVBoxLayout
 
-from studio_ui import fuzzy
-from studio_ui.palette_rows import RowDelegate
+from studio_ui.palette import fuzzy
+from studio_ui.palette.rows import RowDelegate
 from studio_ui.settings import Settings
 
 RECENT = 6

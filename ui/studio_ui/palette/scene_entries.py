@@ -7,10 +7,10 @@ from functools import partial
 from itertools import islice
 
 from studio_core.scene.nodes import MaterialId, NodeId
-from studio_ui.choosing import meshes_below
 from studio_ui.context import Context
-from studio_ui.material_drag import assigned
-from studio_ui.palette import Entry
+from studio_ui.objects.choosing import meshes_below
+from studio_ui.objects.material_drag import assigned
+from studio_ui.palette.palette import Entry
 from studio_ui.panels.node_kinds import kind_name
 
 _MOST = 300

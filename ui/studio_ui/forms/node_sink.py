@@ -8,8 +8,8 @@ from studio_core.edits import Compound, Edit, SetFields
 from studio_core.params import Value, param_infos
 from studio_core.scene.nodes import NodeId
 from studio_ui.context import Context
+from studio_ui.forms.sinks import EditSink
 from studio_ui.panels.node_kinds import kinds_name
-from studio_ui.sinks import EditSink
 
 
 class NodeSink(EditSink):

@@ -11,9 +11,9 @@ from PySide6.QtWidgets import QApplication
 
 from studio_ui.canvas.choice import PREFERENCES, CanvasChoice
 from studio_ui.canvas.switch_viewport import SwitchViewport
+from studio_ui.look.theme import DARK, LIGHT, THEMES, Theme, wear
 from studio_ui.preferences.catalogue import SYSTEM
 from studio_ui.preferences.store import Preferences
-from studio_ui.theme import DARK, LIGHT, THEMES, Theme, wear
 
 
 class Appearance:

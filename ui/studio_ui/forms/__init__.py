@@ -1,0 +1,1 @@
+"""Controls of parameters: from metadata to widgets, and from what is typed to edits."""

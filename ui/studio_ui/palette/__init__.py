@@ -1,0 +1,1 @@
+"""The command palette: everything the menus offer, found by a few letters."""
