@@ -162,6 +162,7 @@ def test_new_forgets_the_file(make: Make, tmp_path: Path) -> None:
     assert driver.window.files.path is None
     assert not driver.document.modified
     assert driver.window.front.start_page.isVisible()
+    assert driver.window.status.vertices.text() == ""
 
 
 def test_an_absurd_size_asks_for_the_unit(driver: Driver, tmp_path: Path) -> None:

@@ -166,6 +166,7 @@ class Following:
 
     def _opened(self) -> None:
         self._viewport.set_picture(None, None)
+        self._status.forget_picture()
         self._context.feed.forget()
         self._greet()
 

@@ -108,6 +108,12 @@ class StatusBar(QStatusBar):
         self.directions.setToolTip("\n".join([_DIRECTIONS, *counts]))
         self._fit()
 
+    def forget_picture(self) -> None:
+        """There is none any more."""
+        for label in (self.vertices, self.directions, self.time, self.error):
+            label.clear()
+        self._fit()
+
     def show_freshness(self, state: Freshness) -> None:
         """How the picture stands to the scene."""
         self.time.setToolTip(f"{_TIME} ({state.value})")
