@@ -15,6 +15,7 @@ SUITES = {
         "reference": "studio.bench.reference",
         "cuts": "studio.bench.cuts",
         "window": "studio.bench.window",
+        "photograph": "studio.bench.photograph",
     },
     "stress": {"ui": "studio.bench.stress_ui"},
 }
