@@ -22,6 +22,7 @@ from studio_core.contract import Services
 from studio_core.kernels.compose import (
     GENERAL,
     RECORD,
+    add_caught,
     add_light,
     add_samples,
     caught_light,
@@ -175,7 +176,8 @@ class Compositor:
         out = self._hits(hits, faces, tables, job)
         rows, photograph = self.photograph(scene, radiance.surfaces, hits, samples)
         values = np.empty_like(photograph)
-        caught_light(0, len(rows), *_caught(hits, rows, faces, tables), photograph, values)
+        given = (rows, hits.face, hits.u, hits.v, faces.shown, tables.record, photograph)
+        caught_light(0, len(rows), *given, values)
         out[rows] = values
         return out
 
@@ -226,14 +228,13 @@ class Compositor:
     ) -> None:
         """Adds what surfaces show that catch shadows: the photograph (N, 3) behind them, as it is lit."""
         hits, rows = layer.hits, layer.caught
-        values = np.empty((len(rows), 3), np.float32)
-        given = (*_caught(hits, rows, faces, tables), photograph)
+        places = (rows, layer.caught_samples, hits.samples**2, layer.caught_weight)
+        given = (*places, hits.face, hits.u, hits.v, faces.shown, tables.record, photograph, out)
 
         def catch(start: int, stop: int) -> None:
-            caught_light(start, stop, *given, values)
+            add_caught(start, stop, *given)
 
         self._workers.run(len(rows), PIXELS, catch, job)
-        add_samples(layer.caught_samples, hits.samples**2, layer.caught_weight, values, out)
 
     def _hits(self, hits: Hits, faces: _Faces, tables: _Tables, job: Job | None) -> F32:
         out = np.empty((len(hits.face), 3), np.float32)
@@ -314,11 +315,6 @@ class Compositor:
             coverage[hits.edges.pixels] = outline(hits.edges.hits)[0]
         shape = (view.height, view.width)
         return _Outline(coverage.reshape(shape), node.reshape(shape), distance.reshape(shape))
-
-
-def _caught(hits: Hits, rows: I64, faces: _Faces, tables: _Tables) -> tuple[I64, I32, F32, F32, U32, F32]:
-    """What `caught_light` asks of hits."""
-    return (rows, hits.face, hits.u, hits.v, faces.shown, tables.record)
 
 
 def _add_light(given: tuple[Any, ...], start: int, stop: int) -> None:

@@ -343,6 +343,46 @@ def caught_light(
 
 
 @kernel
+def add_caught(
+    start: int,
+    stop: int,
+    rows: I64,
+    samples: I64,
+    count: int,
+    weight: F32,
+    face: I32,
+    u: F32,
+    v: F32,
+    shown: U32,
+    record: F32,
+    photograph: F32,
+    out: F32,
+) -> None:
+    """Adds what `caught_light` makes to the pixels out (P, 3) whose samples (N,) rise, `count` a pixel.
+
+    A pixel belongs to the part start … stop−1 that its first sample is in, so that threads share none.
+    weight (N,) is how much each counts.
+    """
+    share = _ONE / np.float32(count)
+    n = start
+    while 0 < n < stop and samples[n] // count == samples[n - 1] // count:
+        n += 1
+    last = -1
+    while n < len(rows):
+        pixel = samples[n] // count
+        if n >= stop and pixel != last:
+            break
+        last = pixel
+        hit, part = rows[n], weight[n] * share
+        f = face[hit]
+        i, j, k = shown[f, 0], shown[f, 1], shown[f, 2]
+        for c in range(3):
+            light = mix(record[i, 3 + c], record[j, 3 + c], record[k, 3 + c], u[hit], v[hit])
+            out[pixel, c] += part * (light * photograph[n, c])
+        n += 1
+
+
+@kernel
 def outline_pixels(
     start: int,
     stop: int,

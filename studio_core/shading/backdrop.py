@@ -58,6 +58,8 @@ class BackdropPainter:
         self._workers = workers
         self._sky: Kept[F32] = Kept()
         self._open: Kept[OpenLight] = Kept()
+        self._before: Kept[F64] = Kept()
+        self._turned: tuple[float, float] | None = None
 
     def backdrop(self, scene: Scene) -> Backdrop | None:
         """The environment that is seen; None where there is none."""
@@ -109,7 +111,11 @@ class BackdropPainter:
         environment = shown_environment(scene)
         if environment is None or not environment.background:
             return
-        before = self.before(environment, mesh.normals[rows])
+        turned = (environment.azimuth, environment.tilt)
+        if turned != self._turned:
+            self._turned, self._before = turned, Kept()
+        kept = (mesh.normals, mesh.material, catches, environment.image)
+        before = self._before(lambda: self.before(environment, mesh.normals[rows]), *kept)
         lights = {node.id: node for node in scene.of(Light) if scene.shown(node.id)}
         now = radiance.irradiance(lights)[rows]
         ratio = np.divide(now, before, out=np.zeros(now.shape), where=before > 0)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from oracles.radiance import bilinear_repeat, lat_long
 
@@ -15,9 +15,11 @@ from studio_core.kernels.compose import (
     CONSTANT,
     GENERAL,
     RECORD,
+    add_caught,
     add_light,
     add_samples,
     average,
+    caught_light,
     face_texels,
     shade_hits,
     texel,
@@ -219,3 +221,27 @@ def test_texels_along_a_metre_are_those_of_the_finest_level():
     np.testing.assert_allclose(out[[0, 2]], [np.sqrt(6 * 32 * 8), 1], rtol=1e-6)
     assert out[1] == 0
     assert out[3] == pytest.approx(1e10 * np.sqrt(0.5 * 6 * 32 * 8))  # a face without area
+
+
+@given(st.lists(st.integers(0, 30), max_size=60), st.integers(1, 9), st.integers(0, 10**6))
+@settings(max_examples=60)
+def test_caught_light_is_added_alike_in_any_parts(pixels, step, seed):
+    """As `caught_light` and `add_samples` do one after the other; no pixel is two parts' own."""
+    rng, count = np.random.default_rng(seed), 4
+    samples = np.sort(np.array(pixels, np.int64) * count + rng.integers(0, count, len(pixels)))
+    rows = np.arange(len(samples))
+    record = rng.random((6, 8)).astype(np.float32)
+    shown = np.array([[0, 1, 2], [3, 4, 5]], np.uint32)
+    u, v, weight = rng.random((3, len(rows))).astype(np.float32)
+    photograph = rng.random((len(rows), 3)).astype(np.float32)
+    hits = (rng.integers(0, 2, len(rows)).astype(np.int32), u, v, shown, record)
+    values, expected = np.empty_like(photograph), np.ones((31, 3), np.float32)
+    caught_light(0, len(rows), rows, *hits, photograph, values)
+    add_samples(samples, count, weight, values, expected)
+    made, written = np.ones((31, 3), np.float32), []
+    for start in range(0, len(rows), step):
+        before = made.copy()
+        add_caught(start, min(start + step, len(rows)), rows, samples, count, weight, *hits, photograph, made)
+        written.append(set(np.flatnonzero((made != before).any(axis=1)).tolist()))
+    np.testing.assert_allclose(made, expected, rtol=1e-5)
+    assert sum(map(len, written)) == len(set().union(*written))
