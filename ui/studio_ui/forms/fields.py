@@ -252,6 +252,7 @@ class TextField(Field):
             self._value = str(value)
             self.edit.setPlaceholderText("")
             self.edit.setText(self._value)
+            self.edit.setCursorPosition(0)  # long names are told from their beginning
 
     def show_mixed(self, value: Any) -> None:
         """A dash; nothing typed leaves all as they are."""
