@@ -46,7 +46,8 @@ class PaintedStage:
         terms = (0.15 + 0.6 * swing**2).astype(np.float32).reshape(len(mesh), TERMS, 3)
         valid = visible_vertices(surfaces, hits) | self.everywhere
         lights = list(frame.scene.of(Light))[:1]
-        layer = LayerRadiance(terms * valid[:, None, None], np.zeros((len(mesh), 3), np.float32))
+        irradiance = 4 * terms[:, 0] * valid[:, None]
+        layer = LayerRadiance(terms * valid[:, None, None], irradiance)
         return Radiance(surfaces, hits, {light.id: layer for light in lights}, valid, 1024, True)
 
 

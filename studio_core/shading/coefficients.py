@@ -7,12 +7,14 @@ found out by asking the model along the range of the picture's values.
 
 from __future__ import annotations
 
+import dataclasses
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from studio_core.arrays import frozen_map
 from studio_core.contract import Registry
 from studio_core.kernels.compose import AFFINE, CONSTANT, GENERAL
 from studio_core.params import Value
@@ -112,7 +114,8 @@ class CoefficientTable:
         return self._made[1]
 
     def _look(self, material: Material, pictures: dict[tuple[str, bool], _Pyramid]) -> _Look:
-        resolved = resolve(material, self._registry)
+        bare = dataclasses.replace(material, textures=frozen_map()) if material.catches else material
+        resolved = resolve(bare, self._registry)  # what catches shadows shows no picture of its own
         none = np.zeros(WIDTH, np.float32)
         if not resolved.textures:
             plain = coefficients(resolved).reshape(WIDTH)

@@ -60,6 +60,9 @@ LOOKS = {
         id="look", name="Pane", opacity=0.6, textures={"base_color": Texture(CHECKS, (2.0, 2.0))}
     ),
     "floor of a photograph": Material(id="look", name="Floor", catches=True),
+    "textured floor of a photograph": Material(
+        id="look", name="Oak", model="ggx", textures={"base_color": Texture(CHECKS)}, catches=True
+    ),
     "catching glass": Material(id="look", name="Both", catches=True, opacity=0.3),
 }  # fmt: skip
 
