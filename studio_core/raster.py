@@ -25,7 +25,6 @@ from studio_core.kernels.compose import (
     add_caught,
     add_light,
     add_samples,
-    caught_light,
     face_texels,
     hit_coefficients,
     outline_pixels,
@@ -175,10 +174,8 @@ class Compositor:
         tables = self._tables(scene, radiance, table, hits.view, job)
         out = self._hits(hits, faces, tables, job)
         rows, photograph = self.photograph(scene, radiance.surfaces, hits, samples)
-        values = np.empty_like(photograph)
-        given = (rows, hits.face, hits.u, hits.v, faces.shown, tables.record, photograph)
-        caught_light(0, len(rows), *given, values)
-        out[rows] = values
+        given = (rows, rows, 1, np.ones(len(rows), np.float32), hits.face, hits.u, hits.v, faces.shown)
+        add_caught(0, len(rows), *given, tables.record, photograph, out)
         return out
 
     def photograph(self, scene: Scene, surfaces: Surfaces, hits: Hits, samples: I64) -> tuple[I64, F32]:

@@ -22,7 +22,7 @@ Colour = tuple[np.float32, np.float32, np.float32]
 
 CONSTANT, AFFINE, GENERAL = 0, 1, 2
 CAUGHT = 3
-"""What catches shadows, for canvases; kernels draw it by `caught_light`."""
+"""What catches shadows, for canvases; kernels draw it by `add_caught`."""
 RECORD = 8
 """Floats of a vertex: two colours, u, v."""
 ROOT_TWO = 2**0.5
@@ -320,29 +320,6 @@ def add_samples(samples: I64, count: int, weight: F32, values: F32, out: F32) ->
 
 
 @kernel
-def caught_light(
-    start: int,
-    stop: int,
-    rows: I64,
-    face: I32,
-    u: F32,
-    v: F32,
-    shown: U32,
-    record: F32,
-    photograph: F32,
-    out: F32,
-) -> None:
-    """out (N, 3) of hits rows[start:stop]: photograph (N, 3) times record[:, 3:6] between the corners."""
-    for n in range(start, stop):
-        hit = rows[n]
-        f = face[hit]
-        i, j, k = shown[f, 0], shown[f, 1], shown[f, 2]
-        for c in range(3):
-            light = mix(record[i, 3 + c], record[j, 3 + c], record[k, 3 + c], u[hit], v[hit])
-            out[n, c] = light * photograph[n, c]
-
-
-@kernel
 def add_caught(
     start: int,
     stop: int,
@@ -358,10 +335,11 @@ def add_caught(
     photograph: F32,
     out: F32,
 ) -> None:
-    """Adds what `caught_light` makes to the pixels out (P, 3) whose samples (N,) rise, `count` a pixel.
+    """Adds what hits rows[start:stop] show to the pixels out (P, 3), `count` samples each.
 
-    A pixel belongs to the part start … stop−1 that its first sample is in, so that threads share none.
-    weight (N,) is how much each counts.
+    That is photograph (N, 3) times record[:, 3:6] between the corners, times weight (N,); samples (N,), which
+    must rise, are where they belong. A pixel belongs to the part start … stop−1 that its first sample is in,
+    so that threads share none.
     """
     share = _ONE / np.float32(count)
     n = start
