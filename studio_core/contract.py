@@ -18,6 +18,9 @@ from studio_core.params import Value
 from studio_core.scene.nodes import Material, MeshObject, Node, Scene
 
 if TYPE_CHECKING:
+    from studio_core.capturing.artifacts import CaptureState
+    from studio_core.capturing.settings import CaptureSettings
+    from studio_core.imaging.photograph import Photograph
     from studio_core.shading.cache import DiskCache
     from studio_core.shading.job import Job
     from studio_core.shading.pipeline import Stage
@@ -160,6 +163,30 @@ class ShadingBackend(Protocol):
         ...
 
 
+class Capturer(Protocol):
+    """Makes light out of photographs of a room."""
+
+    label: str
+
+    def open(self, services: Services) -> CaptureRun:
+        """A run that remembers what its stages made, for one capture."""
+        ...
+
+
+class CaptureRun(Protocol):
+    """Stages in their order; those whose photographs and settings are as before are not run again."""
+
+    def run(
+        self, photographs: Sequence[Photograph], settings: CaptureSettings, job: Job, until: str = ""
+    ) -> CaptureState:
+        """The state after the step `until` (a field of CaptureSettings; "" for all).
+
+        Publishes the state after every stage. Raises InputError in one sentence where the photographs give
+        no result, and Cancelled; what was made until then is remembered.
+        """
+        ...
+
+
 @dataclass(frozen=True)
 class Services:
     """What the composition root hands to backends: threads, registry, cache folder."""
@@ -173,6 +200,8 @@ __all__ = [
     "API",
     "KINDS",
     "Brdf",
+    "CaptureRun",
+    "Capturer",
     "Exporter",
     "ImportedModel",
     "Importer",

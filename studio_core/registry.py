@@ -23,6 +23,7 @@ _NEEDS = {
     "importer": ("label", "extensions", "load"),
     "exporter": ("label", "extensions", "save"),
     "panel": ("title", "make"),
+    "capturer": ("label", "open"),
 }
 _BUNDLED = "studio_plugins."
 _MOST_FAILURES = 200

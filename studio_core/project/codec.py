@@ -19,6 +19,7 @@ from studio_core.project.canonical import dumps, text_hash
 from studio_core.project.fields import Record
 from studio_core.project.memo import Memo
 from studio_core.scene import nodes
+from studio_core.scene.capture import Capture
 from studio_core.scene.geometry import Geometry, Image
 from studio_core.scene.nodes import Material, Node, Scene
 from studio_core.scene.room import Room
@@ -33,6 +34,7 @@ TAGS: Mapping[str, type[Any]] = {
     "spot_lamp": nodes.SpotLamp,
     "directional_lamp": nodes.DirectionalLamp,
     "area_lamp": nodes.AreaLamp,
+    "capture": Capture,
     "material": nodes.Material,
 }
 _TAG_OF = {cls: tag for tag, cls in TAGS.items()}

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field, fields
 from enum import Flag, auto
 
 from studio_core.arrays import frozen_map
+from studio_core.scene.capture import Capture
 from studio_core.scene.nodes import (
     Camera,
     Environment,
@@ -55,7 +56,8 @@ _MADE_FROM = {f.name for f in fields(Room)} - {f.name for f in fields(MeshObject
 class Changes:
     """Nodes by what changed on them, and materials.
 
-    Added and removed nodes have STRUCTURE; cameras only ever NAME, since nothing is lit otherwise by them.
+    Added and removed nodes have STRUCTURE; cameras and captures only ever NAME: they light
+    nothing.
     """
 
     nodes: Mapping[NodeId, Aspect] = field(default_factory=frozen_map)
@@ -120,8 +122,8 @@ def diff(before: Scene, after: Scene) -> Changes:
                 nodes[below] = nodes.get(below, Aspect.NONE) | inherited | _light(after[below], inherited)
     for node_id in nodes:
         there = [scene.nodes[node_id] for scene in (before, after) if node_id in scene.nodes]
-        if all(isinstance(node, Camera) for node in there):
-            nodes[node_id] = Aspect.NAME  # no light depends on a camera, and who looks through it has a view
+        if all(isinstance(node, Camera | Capture) for node in there):
+            nodes[node_id] = Aspect.NAME  # no light depends on it, and who looks through a camera has a view
     materials = {m for m, new in after.materials.items() if before.materials.get(m) is not new}
     materials |= before.materials.keys() - after.materials.keys()
     aspects = Aspect.MATERIAL if materials else Aspect.NONE

@@ -16,7 +16,7 @@ from studio_ui.look.theme import Theme
 from studio_ui.settings import Settings
 
 STEPS = (
-    (Aspect.TRANSFORM, "Click a piece of furniture, then drag it"),
+    (Aspect.TRANSFORM, "Click furniture, then drag it"),
     (Aspect.LIGHT, "Shift+right-drag turns the light"),
     (Aspect.MATERIAL, "Change a colour under Materials"),
 )

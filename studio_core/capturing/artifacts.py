@@ -1,0 +1,203 @@
+"""What the stages of a capture make, in order; the wizard shows each, the report tells it in numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from studio_core.arrays import frozen_map
+from studio_core.capturing.settings import Patch
+from studio_core.imaging.photograph import Photograph
+from studio_core.imaging.projection import Circle, Lens
+from studio_core.scene.geometry import Image
+
+F32 = npt.NDArray[np.float32]
+F64 = npt.NDArray[np.float64]
+Mask = npt.NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class Bracket:
+    """Photographs of one view with different exposures, dark to bright, and their listed EV (prior)."""
+
+    shots: tuple[Photograph, ...]
+    listed: tuple[float, ...]
+    certain: tuple[bool, ...]
+    """Whether the EV comes from the photograph or was typed; else it is a guess."""
+
+
+@dataclass(frozen=True, eq=False)
+class Brackets:
+    """By side: `front`, and `back` where there is one. `layout` is what was found or chosen."""
+
+    layout: str
+    sides: Mapping[str, Bracket]
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Motion:
+    """How a frame is shifted and turned against its bracket's reference, pixels (y down) and degrees.
+
+    A point p of the reference lies at R(p − c) + c + (dx, dy) in the frame, c the picture's centre, R a
+    turn by `degrees` clockwise as seen. `correlation` of the two after alignment; when it is not `trusted`,
+    the motion is 0.
+    """
+
+    dx: float = 0.0
+    dy: float = 0.0
+    degrees: float = 0.0
+    correlation: float = 1.0
+    trusted: bool = True
+
+
+@dataclass(frozen=True, eq=False)
+class Response:
+    """How light became numbers: `curve` (3, L) log2 exposure of the L levels of red, green and blue.
+
+    Levels are 0 … L−1 over 0 … `top` of the pixels' numbers (linear in between), strictly rising inside
+    `black` … `white`; 0 at the middle level. `noise`: (2,) variance of a number n (in 0…1) is about
+    noise[0] + noise[1] · n.
+    """
+
+    curve: F64
+    top: float
+    black: tuple[float, float, float]
+    white: tuple[float, float, float]
+    noise: tuple[float, float]
+    measured: bool = True
+    rms: float = 0.0
+    """Of what the curve leaves unexplained, log2."""
+
+
+@dataclass(frozen=True)
+class Exposures:
+    """Solved EV of one bracket's shots beside the listed ones; `wrong`: shots whose step differs > 0.3 EV."""
+
+    listed: tuple[float, ...]
+    solved: tuple[float, ...]
+    wrong: tuple[int, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class LensLight:
+    """Merged light of one side in its reference frame: (H, W, 3) linear, one scale for both sides.
+
+    `clipped`: brighter than any exposure resolves (at least the value given); `dark`: darker than any;
+    `moved`: one exposure alone was used; `noise` (H, W): relative standard deviation of luminance.
+    """
+
+    light: F32
+    clipped: Mask
+    dark: Mask
+    moved: Mask
+    noise: F32
+    motions: tuple[Motion, ...]
+    exposures: Exposures
+
+
+@dataclass(frozen=True)
+class FoundCircle:
+    """A lens' image, and how sure that is (0 … 1: under 0.5 it should be looked at)."""
+
+    circle: Circle
+    confidence: float
+    by_hand: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class View:
+    """One lens ready to be looked through: light, what is usable, where directions lie."""
+
+    light: F32
+    usable: Mask
+    circle: Circle
+    lens: Lens
+
+
+@dataclass(frozen=True, eq=False)
+class Registration:
+    """`rotation` (3, 3): front lens' frame from the back lens' frame. `gain`: front = gain · back (3,).
+
+    `falloff` (3,): light at s = θ / θ_max is 1 + a s² + b s⁴ + c s⁶ of the axis'. `spread`: median angle
+    between what both show after registration, degrees; `matches` were used.
+    """
+
+    rotation: F64
+    lens: Lens
+    gain: F64
+    falloff: tuple[float, float, float]
+    spread: float
+    matches: int
+    trusted: bool
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Reflections:
+    """Rectangles that are replaced; `lights`: by side, the light after that."""
+
+    patches: tuple[Patch, ...]
+    lights: Mapping[str, F32]
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Stitched:
+    """Equirectangular (H, 2H, 3); `unresolved`: clipped or never seen; `from_front` (H, 2H) share 0 … 1.
+
+    `upright` (3, 3): finished picture's frame from the front lens' frame.
+    """
+
+    light: F32
+    clipped: Mask
+    unseen: Mask
+    from_front: F32
+    upright: F64
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """`white`: RGB factors; `luminance_scale`: cd/m² for one unit of luminance, with its relative
+    uncertainty (standard deviation); `sun`: factor by which clipped light was raised, with uncertainty."""
+
+    white: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    luminance_scale: float | None = None
+    scale_uncertainty: float = 0.0
+    sun: float = 1.0
+    sun_uncertainty: float = 0.0
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Captured:
+    """The end: environment, cube map (6 faces, `studio_core.imaging.cubemap`'s order), and the report.
+
+    `unresolved` (H, 2H): 0 resolved, 1 clipped in every exposure, 2 too dark in every one, 3 never seen.
+    """
+
+    environment: Image
+    faces: F32
+    unresolved: npt.NDArray[np.uint8]
+    calibration: Calibration
+    report: Mapping[str, Any] = field(default_factory=frozen_map)
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class CaptureState:
+    """How far a capture has come: what each step made, None or empty where it has not been reached."""
+
+    brackets: Brackets | None = None
+    response: Response | None = None
+    lights: Mapping[str, LensLight] = field(default_factory=frozen_map)
+    circles: Mapping[str, FoundCircle] = field(default_factory=frozen_map)
+    registration: Registration | None = None
+    reflections: Reflections | None = None
+    stitched: Stitched | None = None
+    captured: Captured | None = None
+    notes: tuple[str, ...] = ()
