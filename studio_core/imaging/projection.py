@@ -42,7 +42,8 @@ class Lens:
     `fov`: degrees across the circle. `coefficients`: k1 … k4 of θ + k1 θ³ + k2 θ⁵ + … (Kannala and Brandt
     2006, with f absorbed by the circle), or a0, a1, a2 … of OCamCalib's polynomial in units of the circle's
     radius (Scaramuzza 2006), which `fov` only cuts off. `affine`: OCamCalib's c, d, e:
-    picture = [[c, d], [e, 1]] · ideal, about the centre, in its rows-and-columns order. ValueError when no picture can come from it.
+    picture = [[c, d], [e, 1]] · ideal, about the centre, rows before columns. ValueError when no picture can
+    come from it.
     """
 
     model: str = EQUIDISTANT
