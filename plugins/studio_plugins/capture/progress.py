@@ -38,7 +38,7 @@ class StageJob(Job):
 class Kept:
     """The last result of every stage; made again where what it was made from is no longer the same.
 
-    Inputs are compared by `==`: settings by value, pictures (which have no equality of their own) by identity.
+    Inputs are compared by `==`: settings by value; pictures, without equality of their own, by identity.
     """
 
     def __init__(self) -> None:
