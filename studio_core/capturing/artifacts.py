@@ -44,8 +44,10 @@ class Motion:
     """How a frame is shifted and turned against its bracket's reference, pixels (y down) and degrees.
 
     A point p of the reference lies at R(p − c) + c + (dx, dy) in the frame, c the picture's centre, R a
-    turn by `degrees` clockwise as seen. `correlation` of the two after alignment; when it is not `trusted`,
-    the motion is 0.
+    turn by `degrees` clockwise as seen. Behind a fisheye the lens is turned in space instead, its circle
+    staying where it is: a direction d of the reference lies at turn(rotation) · d in the frame, `rotation`
+    being an axis in the lens' frame times degrees (`studio_core.imaging.warping` applies both).
+    `correlation` of the two after alignment; when it is not `trusted`, the motion is 0.
     """
 
     dx: float = 0.0
@@ -53,6 +55,7 @@ class Motion:
     degrees: float = 0.0
     correlation: float = 1.0
     trusted: bool = True
+    rotation: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True, eq=False)
