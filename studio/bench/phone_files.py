@@ -1,0 +1,70 @@
+"""The simulated phone's photographs as files with EXIF, as they would be dropped on the studio."""
+
+from __future__ import annotations
+
+from datetime import datetime, timedelta
+from pathlib import Path
+
+import numpy as np
+
+from studio.bench.phone import Shots
+from studio_core.imaging.photograph import Photograph, ShotFacts
+
+START = datetime(2024, 5, 4, 12, 30, 0)
+_EXIF, _GPS = 0x8769, 0x8825
+
+
+def write_shots(
+    shots: Shots, folder: Path, *, kind: str = "jpg", exif: bool = True, position: bool = False
+) -> tuple[tuple[Path, ...], tuple[Path, ...]]:
+    """Files of the front and of the back bracket. `position`: EXIF tells where it was, too."""
+    made = []
+    for bracket in (shots.front, shots.back):
+        paths = []
+        for shot in bracket:
+            path = folder / Path(shot.facts.name).with_suffix(f".{kind}")
+            write_photograph(shot, path, exif=exif, position=position, quality=shots.truth.phone.jpeg or 95)
+            paths.append(path)
+        made.append(tuple(paths))
+    return made[0], made[1]
+
+
+def write_photograph(
+    shot: Photograph, path: Path, *, exif: bool = True, position: bool = False, quality: int = 95
+) -> None:
+    """JPEG, PNG or TIFF; 16 bit (which JPEG can't) without EXIF."""
+    if shot.pixels.dtype == np.uint16:
+        import cv2
+
+        cv2.imwrite(str(path), np.ascontiguousarray(shot.pixels[:, :, ::-1]))
+        return
+    from PIL import Image
+
+    facts = exif_of(shot.facts, position) if exif else Image.Exif()
+    Image.fromarray(shot.pixels).save(path, quality=quality, subsampling=0, exif=facts.tobytes())
+
+
+def exif_of(facts: ShotFacts, position: bool = False):  # type: ignore[no-untyped-def]  # PIL's Exif
+    """What a camera writes: make, model, time, exposure, ISO, aperture, bias."""
+    from PIL import Image
+    from PIL.TiffImagePlugin import IFDRational
+
+    made = Image.Exif()
+    made[271], made[272] = "Lucarne", facts.camera
+    taken = START + timedelta(seconds=facts.taken or 0.0)
+    part = made.get_ifd(_EXIF)
+    part[36867] = taken.strftime("%Y:%m:%d %H:%M:%S")
+    part[37521] = f"{taken.microsecond // 10_000:02d}"
+    if facts.seconds is not None:
+        part[33434] = IFDRational(round(facts.seconds * 1_000_000), 1_000_000)
+    if facts.aperture is not None:
+        part[33437] = IFDRational(round(facts.aperture * 100), 100)
+    if facts.iso is not None:
+        part[34855] = round(facts.iso)
+    if facts.bias is not None:
+        part[37380] = IFDRational(round(facts.bias * 100), 100)
+    if position:
+        gps = made.get_ifd(_GPS)
+        gps[1], gps[2] = "N", (35.0, 40.0, 34.0)
+        gps[3], gps[4] = "E", (139.0, 39.0, 1.0)
+    return made
