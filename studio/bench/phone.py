@@ -104,7 +104,7 @@ class SideTruth:
 
     `stops`: log2 of both, (H, W). `evs`: of the shots (any origin common to both sides), `listed` what their
     files say. `shakes`: (3, 3) each: a direction d of the reference's lens frame is at shakes[i] @ d in
-    shot i; `motions`: the same as seen at the circle's middle. `moved`: where the mover was in any shot.
+    shot i; `motions`: the same as axes times degrees. `moved`: where the mover was in any shot.
     """
 
     circle: Circle
@@ -206,7 +206,7 @@ def shoot(environment: F32, phone: Phone, seed: int = 0) -> Shots:
             pixels = developed(phone, light * (scale * 2.0**ev * white), rng)
             made.append(_photograph(pixels, side, index, listed[index]))
         shots[side] = tuple(made)
-        motions = tuple(_motion(phone, one.circle, shake) for shake in shakes)
+        motions = tuple(_motion(shake) for shake in shakes)
         sides[side] = replace(one, moved=moved, evs=evs, listed=listed, shakes=shakes, motions=motions)
     clipped = _clipped(environment, scale * 2.0 ** min(phone.evs))
     truth = replace(truth, front=sides[FRONT], back=sides[BACK], reference=reference, clipped=clipped)
@@ -288,13 +288,14 @@ def _movers(phone: Phone, side: str, room: Room, rng: np.random.Generator) -> tu
     return tuple(made)
 
 
-def _motion(phone: Phone, circle: Circle, shake: F64) -> Motion:
-    """At the axis: where what the reference shows in its middle lies in the shot, and how it is turned."""
-    from studio_core.imaging.projection import project
-
-    middle, _ = project(phone.lens, circle, shake @ np.array([0.0, 0.0, -1.0]))
-    away = np.degrees(np.arctan2(shake[1, 0] - shake[0, 1], shake[0, 0] + shake[1, 1]))
-    return Motion(float(middle[0] - circle.x), float(middle[1] - circle.y), float(-away))
+def _motion(shake: F64) -> Motion:
+    """The turn as axis times degrees (small ones: never half a turn)."""
+    axis = np.array([shake[2, 1] - shake[1, 2], shake[0, 2] - shake[2, 0], shake[1, 0] - shake[0, 1]]) / 2
+    sine = float(np.linalg.norm(axis))
+    if sine == 0:
+        return Motion()
+    x, y, z = (float(a) for a in axis / sine * np.degrees(np.arcsin(min(sine, 1.0))))
+    return Motion(rotation=(x, y, z))
 
 
 def _clipped(environment: F32, exposure: float) -> float:
