@@ -7,6 +7,7 @@ circle's centre, where R is the circle's radius in pixels and 2 θ_max the field
 
 from __future__ import annotations
 
+import functools
 import math
 from dataclasses import dataclass, replace
 from typing import Any
@@ -20,6 +21,9 @@ EQUIDISTANT, EQUISOLID, STEREOGRAPHIC = "equidistant", "equisolid", "stereograph
 ORTHOGRAPHIC, KANNALA_BRANDT, OCAM = "orthographic", "Kannala–Brandt", "OCamCalib"
 MODELS = (EQUIDISTANT, EQUISOLID, STEREOGRAPHIC, ORTHOGRAPHIC, KANNALA_BRANDT, OCAM)
 _TABLE = 4096
+_BEHIND = -0.99  # cos 172°: nothing is projected that lies further behind
+_FURTHEST = 4
+_BLOCK = 1 << 15
 
 
 @dataclass(frozen=True)
@@ -124,33 +128,109 @@ class Lens:
         return np.asarray(np.interp(theta, upward, radius), np.float64)
 
 
+@dataclass(frozen=True, eq=False)
+class _Tables:
+    """A lens' curve where neither arc tangents nor searching are needed to read it.
+
+    `out`: r / (R sin θ) over cos θ from `_BEHIND` to 1. `sine` and `cosine`: R sin θ / r and cos θ over
+    (r / R)² from 0 to `_FURTHEST`; both curves are smooth in these. Each has a node more than is read.
+    """
+
+    out: F64
+    sine: F64
+    cosine: F64
+    edge: float  # cos θ_max
+    square: float  # (r / R)² of it
+
+
+@functools.lru_cache(maxsize=16)
+def _tables(lens: Lens) -> _Tables:
+    cosine = np.linspace(_BEHIND, 1, _TABLE + 1)
+    theta = np.arccos(cosine)
+    theta[-1] = 1e-6  # the limit on the axis
+    out = lens.radius_of(theta) / np.sin(theta)
+    radius = np.sqrt(np.linspace(0, _FURTHEST, _TABLE * _FURTHEST + 1))
+    radius[0] = 1e-6
+    angle = np.minimum(lens.angle_of(radius), np.pi)
+    sine = np.sin(angle) / radius
+    reach = float(lens.radius_of([lens.half])[0])
+    made = _Tables(
+        np.append(out, out[-1]),
+        np.append(sine, sine[-1]),
+        np.append(np.cos(angle), np.cos(angle[-1])),
+        math.cos(lens.half),
+        reach * reach,
+    )
+    for table in (made.out, made.sine, made.cosine):
+        table.flags.writeable = False
+    return made
+
+
+def _read(table: F64, at: F64) -> F64:
+    """Between the nodes of a table, `at` in its steps and inside it."""
+    low = at.astype(np.intp)
+    first = table[low]
+    low += 1
+    return np.asarray(first + (table[low] - first) * (at - low + 1), np.float64)
+
+
 def project(lens: Lens, circle: Circle, directions: npt.NDArray[Any]) -> tuple[F64, npt.NDArray[np.bool_]]:
-    """Points (..., 2) of directions (..., 3) of any length, and which of them the lens sees."""
+    """Points (..., 2) of directions (..., 3) of any length, and which of them the lens sees.
+
+    A direction without length lies at the centre and is not seen. What lies further than 172° from the axis
+    is drawn nearer than the model says; no lens sees it. From a table: within 1e-6 of the circle's radius.
+    """
     d = np.asarray(directions, np.float64)
-    ring = np.hypot(d[..., 0], d[..., 1])
-    theta = np.arctan2(ring, -d[..., 2])
-    reach = circle.radius * lens.radius_of(theta)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        scale = np.where(ring > 0, reach / ring, 0.0)
-    right, down = d[..., 0] * scale, -d[..., 1] * scale
-    c, across, e = lens.affine
-    points = np.stack([e * down + right + circle.x, c * down + across * right + circle.y], axis=-1)
-    return points, theta <= lens.half
+    flat = d.reshape(-1, 3)
+    points = np.empty((len(flat), 2))
+    seen = np.empty(len(flat), np.bool_)
+    tables, (c, across, e) = _tables(lens), lens.affine
+    for start in range(0, len(flat), _BLOCK):
+        x, y, z = flat[start : start + _BLOCK].T
+        with np.errstate(invalid="ignore", divide="ignore"):
+            shrink = 1 / np.sqrt(x * x + y * y + z * z)
+            cosine = z * -shrink
+        some = np.isfinite(cosine)
+        if not some.all():
+            shrink, cosine = np.where(some, shrink, 0.0), np.where(some, cosine, -1.0)
+        seen[start : start + _BLOCK] = cosine >= tables.edge - 1e-12
+        np.clip(cosine, _BEHIND, 1, out=cosine)
+        shrink *= _read(tables.out, (cosine - _BEHIND) * (_TABLE / (1 - _BEHIND)))
+        shrink *= circle.radius
+        right, down = x * shrink, y * -shrink
+        points[start : start + _BLOCK, 0] = e * down + right + circle.x
+        points[start : start + _BLOCK, 1] = c * down + across * right + circle.y
+    return points.reshape(*d.shape[:-1], 2), seen.reshape(d.shape[:-1])
 
 
 def unproject(lens: Lens, circle: Circle, points: npt.NDArray[Any]) -> tuple[F64, npt.NDArray[np.bool_]]:
-    """Unit directions (..., 3) of points (..., 2), and which of them lie in the lens' field of view."""
+    """Unit directions (..., 3) of points (..., 2), and which of them lie in the lens' field of view.
+
+    Points further than twice the radius from the centre show what lies at twice the radius. From a table:
+    within 1e-6, for orthographic lenses 1e-6 except in the outermost thousandth of the circle.
+    """
     p = np.asarray(points, np.float64)
-    x, y = p[..., 0] - circle.x, p[..., 1] - circle.y
-    c, across, e = lens.affine
-    determinant = c - across * e
-    right, down = (c * x - e * y) / determinant, (y - across * x) / determinant
-    reach = np.hypot(right, down)
-    theta = lens.angle_of(reach / circle.radius)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        scale = np.where(reach > 0, np.sin(theta) / reach, 0.0)
-    directions = np.stack([right * scale, -down * scale, -np.cos(theta)], axis=-1)
-    return directions, theta <= lens.half
+    flat = p.reshape(-1, 2)
+    directions = np.empty((len(flat), 3))
+    seen = np.empty(len(flat), np.bool_)
+    tables, (c, across, e) = _tables(lens), lens.affine
+    scale = 1 / ((c - across * e) * circle.radius)
+    for start in range(0, len(flat), _BLOCK):
+        x, y = flat[start : start + _BLOCK].T
+        x, y = x - circle.x, y - circle.y
+        right, up = (c * x - e * y) * scale, (across * x - y) * scale
+        square = right * right + up * up
+        seen[start : start + _BLOCK] = square <= tables.square + 1e-12
+        far = square > _FURTHEST
+        if far.any():
+            with np.errstate(divide="ignore"):
+                shrink = np.where(far, np.sqrt(_FURTHEST / square), 1.0)
+            right, up, square = right * shrink, up * shrink, np.minimum(square, _FURTHEST)
+        square *= _TABLE
+        sine, part = _read(tables.sine, square), directions[start : start + _BLOCK]
+        part[:, 0], part[:, 1] = right * sine, up * sine
+        np.negative(_read(tables.cosine, square), out=part[:, 2])
+    return directions.reshape(*p.shape[:-1], 3), seen.reshape(p.shape[:-1])
 
 
 def pixel_points(height: int, width: int) -> F64:
