@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from studio_core.imaging.latlong import equirect_direction
+from studio_core.imaging.sphere import even_rows, lookup, with_border
 
 Faces = npt.NDArray[np.float32]
 Vectors = npt.NDArray[np.floating[Any]]
@@ -58,6 +59,28 @@ def from_opengl(faces: Faces) -> Faces:
     """OpenGL's faces (right, left, top, bottom, front, back) in our order; the front looks along +z."""
     right, left, top, bottom, front, back = faces
     return np.stack([left, right, top[::-1, ::-1], bottom[::-1, ::-1], front, back])
+
+
+def to_opengl(faces: Faces) -> Faces:
+    """Our faces in OpenGL's order and turns; `from_opengl`'s way back."""
+    left, right, top, bottom, front, back = faces
+    return np.stack([right, left, top[::-1, ::-1], bottom[::-1, ::-1], front, back])
+
+
+def joined(faces: Faces, layout: str) -> Faces:
+    """One picture of OpenGL's faces (6, n, n, C): a "strip" (n, 6n), a "cross" (3n, 4n) or a "vertical cross".
+
+    `split` takes it apart. The corners of crosses are black; the back of a vertical one hangs upside down.
+    """
+    if layout == "strip":
+        return np.concatenate(list(faces), axis=1)
+    rows, columns = {"cross": (3, 4), "vertical cross": (4, 3)}[layout]
+    n = faces.shape[1]
+    made = np.zeros((rows * n, columns * n, faces.shape[3]), faces.dtype)
+    for index, (row, column) in enumerate(_CROSSES[rows, columns]):
+        face = faces[index][::-1, ::-1] if rows == 4 and index == 5 else faces[index]
+        made[row * n : (row + 1) * n, column * n : (column + 1) * n] = face
+    return made
 
 
 def split(pixels: npt.NDArray[np.float32]) -> Faces | None:
@@ -111,6 +134,58 @@ def equirect_from_cube(faces: Faces, edge_aligned: bool = False, samples: int = 
             total += _bilinear(padded, n, edge_aligned, _directions(u, v))
         made[start:stop] = total / samples**2
     return made
+
+
+def faces_from_equirect(pixels: Faces, n: int, samples: int = 0, edge_aligned: bool = False) -> Faces:
+    """(6, n, n, C) faces in our order of an equirectangular picture (H, 2H, C).
+
+    A face's pixel is the mean of samples² bilinear lookups over its area (0: as many as the picture's
+    pixels ask for), in rows that were averaged where they are denser than those lookups. `edge_aligned`:
+    the outermost samples lie on the edges of a face, as OpenEXR wants them.
+    """
+    width = pixels.shape[1]
+    spacing = 2 / max(n - 1, 1) if edge_aligned else 2 / n  # at a face's centre, radians
+    count = samples or max(2, round(np.ceil(spacing * width / (2 * np.pi))))
+    ready = with_border(even_rows(np.asarray(pixels, np.float32), spacing / count), 1)
+    made = np.empty((6, n, n, pixels.shape[2]), np.float32)
+    rows = max(1, (1 << 19) // (n * count * count))
+    a = _steps(np.arange(n * count), n, count, edge_aligned).astype(np.float32)[None, :]
+    away = np.hypot(a, np.float32(1))
+    side_u = 0.5 - np.arctan2(a, np.float32(-1)) / np.float32(2 * np.pi)  # what −z sees, and others turned
+    for start in range(0, n, rows):
+        stop = min(start + rows, n)
+        lines = np.arange(start * count, stop * count)
+        b = _steps(lines, n, count, edge_aligned).astype(np.float32)[:, None]
+        side_v = np.arctan2(away, -b) / np.float32(np.pi)
+        up_u = 0.5 - np.arctan2(a, -b) / np.float32(2 * np.pi)
+        up_v = np.arctan2(np.hypot(a, b), np.float32(1)) / np.float32(np.pi)
+        for face in range(6):
+            if face in (2, 3):
+                u, v = (up_u, up_v) if face == 2 else (np.mod(0.5 - up_u, 1.0), 1 - up_v)
+            else:
+                turn = np.float32({0: 0.25, 1: 0.75, 4: 0.5, 5: 0.0}[face])
+                u, v = np.broadcast_to(np.mod(side_u + turn, 1.0), side_v.shape), side_v
+            seen = lookup(ready, 1, u, v).reshape(stop - start, count, n, count, -1)
+            made[face, start:stop] = seen.mean(axis=(1, 3), dtype=np.float32)
+    return made
+
+
+def edge_samples(faces: Faces) -> Faces:
+    """The same cube with samples on the edges of its faces, as OpenEXR keeps it: equal where faces meet."""
+    n = faces.shape[1]
+    if n == 1:
+        return faces
+    wide = face_directions(n, edge_aligned=True)
+    return _bilinear(_with_border(faces), n, False, wide)
+
+
+def _steps(index: npt.NDArray[np.intp], n: int, count: int, edge_aligned: bool) -> npt.NDArray[np.float64]:
+    """Where the `count` lookups a sample lie across a face, −1 … 1 (a bit beyond when edge-aligned)."""
+    at = (index + 0.5) / count
+    if edge_aligned:
+        made: npt.NDArray[np.float64] = 2 * (at - 0.5) / max(n - 1, 1) - 1.0 if n > 1 else (at - 0.5) * 2
+        return made
+    return np.asarray(2 * at / n - 1.0, np.float64)
 
 
 def _directions(u: npt.NDArray[np.float64], v: npt.NDArray[np.float64]) -> Vectors:
