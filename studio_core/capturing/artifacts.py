@@ -114,12 +114,17 @@ class FoundCircle:
 
 @dataclass(frozen=True, eq=False)
 class View:
-    """One lens ready to be looked through: light, what is usable, where directions lie."""
+    """One lens ready to be looked through: light, what is usable, where directions lie.
+
+    `clipped` and `dark`: as in `LensLight`; None: nothing is.
+    """
 
     light: F32
     usable: Mask
     circle: Circle
     lens: Lens
+    clipped: Mask | None = None
+    dark: Mask | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,9 +156,11 @@ class Reflections:
 
 @dataclass(frozen=True, eq=False)
 class Stitched:
-    """Equirectangular (H, 2H, 3); `unresolved`: clipped or never seen; `from_front` (H, 2H) share 0 … 1.
+    """Equirectangular (H, 2H, 3); `from_front` (H, 2H): the front lens' share, 0 … 1.
 
-    `upright` (3, 3): finished picture's frame from the front lens' frame.
+    `clipped`: brighter than any exposure resolves; `dark`: darker than any; `unseen`: no lens looked there,
+    the light is that of its surroundings. `upright` (3, 3): finished picture's frame from the front lens'
+    frame; `levelled`: degrees by which the horizon was found to be off, None where it was not found.
     """
 
     light: F32
@@ -161,6 +168,9 @@ class Stitched:
     unseen: Mask
     from_front: F32
     upright: F64
+    dark: Mask | None = None
+    levelled: float | None = None
+    notes: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)

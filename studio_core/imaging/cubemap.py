@@ -68,7 +68,7 @@ def to_opengl(faces: Faces) -> Faces:
 
 
 def joined(faces: Faces, layout: str) -> Faces:
-    """One picture of OpenGL's faces (6, n, n, C): a "strip" (n, 6n), a "cross" (3n, 4n) or a "vertical cross".
+    """OpenGL's faces (6, n, n, C) as one picture: a "strip" (n, 6n), "cross" (3n, 4n) or "vertical cross".
 
     `split` takes it apart. The corners of crosses are black; the back of a vertical one hangs upside down.
     """

@@ -1,4 +1,4 @@
-"""Resampling of pictures that go all around (equirectangular), without seams, holes or aliasing at the poles."""
+"""Resampling equirectangular pictures without seams, and without holes or aliasing at their poles."""
 
 from __future__ import annotations
 

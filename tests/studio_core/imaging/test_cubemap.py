@@ -1,4 +1,4 @@
-"""Cube maps made of equirectangular pictures, against a known function of direction and other people's pairs."""
+"""Cube maps of equirectangular pictures, against a known function of direction and other people's pairs."""
 
 from __future__ import annotations
 
