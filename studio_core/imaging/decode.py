@@ -17,9 +17,13 @@ import numpy as np
 import numpy.typing as npt
 
 from studio_core.imaging.radiance import HEADER, RadianceHeader, parse_header
-from studio_core.imaging.transfer import REC709, rgb_to_xyz, srgb_to_linear, to_rec709
+from studio_core.imaging.transfer import REC709, icc_to_rec709, rgb_to_xyz, srgb_to_linear, to_rec709
 
 Pixels = npt.NDArray[Any]
+_HARMLESS = re.compile(
+    "extraneous bytes before marker|Invalid SOS parameters"
+    "|unknown JFIF revision|Unknown Adobe color transform"
+)
 PARTS = 64
 """Parts of a multi-part file that are looked at."""
 
@@ -42,7 +46,8 @@ class Facts:
 
     `envmap` is OpenEXR's environment layout; `edge_aligned` tells that the outermost samples lie on
     the edges of a face; radiance is pixel / `exposure` (Radiance); `notes` are sentences on what was
-    converted or left out.
+    converted or left out. `colour`: see `Photograph.colour`. `exif`: the file's Exif block, base64, where the
+    decoder is the one who finds it; `told`: exposure as a camera's own format tells it.
     """
 
     format: str = ""
@@ -51,13 +56,17 @@ class Facts:
     edge_aligned: bool = False
     exposure: float = 1.0
     notes: list[str] = field(default_factory=list)
+    colour: list[float] = field(default_factory=list)
+    exif: str = ""
+    told: dict[str, Any] = field(default_factory=dict)
 
 
-def decode_file(path: str, limits: Limits) -> tuple[Pixels, Facts]:
+def decode_file(path: str, limits: Limits, *, encoded: bool = False) -> tuple[Pixels, Facts]:
     """Pixels (H, W, 1, 3 or 4) of uint8 (sRGB) or float32 (linear Rec.709), and the facts.
 
     Alpha is kept as the fourth channel as the file has it (associated in OpenEXR, straight elsewhere).
-    Raises Unreadable.
+    `encoded`: whole numbers stay as they are, of uint8 or uint16, and small faults in how a camera wrote its
+    JPEG, which change no pixel, are passed over. Raises Unreadable.
     """
     import OpenImageIO as oiio  # noqa: N813 - its customary name
 
@@ -69,20 +78,21 @@ def decode_file(path: str, limits: Limits) -> tuple[Pixels, Facts]:
     if source is None:
         raise Unreadable(_failure(oiio) or "it is no picture of a known format")
     try:
-        return _decode(oiio, source, path, limits)
+        return _decode(oiio, source, path, limits, encoded)
     finally:
         source.close()
 
 
-def _decode(oiio: Any, source: Any, path: str, limits: Limits) -> tuple[Pixels, Facts]:
+def _decode(oiio: Any, source: Any, path: str, limits: Limits, encoded: bool) -> tuple[Pixels, Facts]:
     notes: list[str] = []
     part, spec, chosen = _part(source, notes)
     _check(spec, limits)
     first, last = min(chosen), max(chosen) + 1
     kind = str(spec.format)
-    whole = kind == "uint8"
-    pixels = source.read_image(part, 0, first, last, oiio.UINT8 if whole else oiio.FLOAT)
-    error = _failure(source)
+    whole = kind == "uint8" or (encoded and kind == "uint16")
+    wanted = oiio.FLOAT if not whole else oiio.UINT8 if kind == "uint8" else oiio.UINT16
+    pixels = source.read_image(part, 0, first, last, wanted)
+    error = _failure(source, _HARMLESS if encoded else None)
     if error or pixels is None:
         raise Unreadable(error or "its pixels cannot be decoded")
     pixels = np.asarray(pixels).reshape(spec.height, spec.width, last - first)
@@ -111,14 +121,15 @@ def _decode(oiio: Any, source: Any, path: str, limits: Limits) -> tuple[Pixels, 
         pixels = _radiance(pixels, header, notes)
     encoding: Literal["linear", "srgb"] = "srgb" if whole else "linear"
     linear = kind in ("half", "float", "double") or _says_linear(_attribute(spec, "oiio:ColorSpace", ""))
-    if whole and linear:
+    if whole and linear and not encoded:
         pixels, encoding = pixels.astype(np.float32) / 255, "linear"
     elif not whole and not linear:
         pixels = pixels.astype(np.float32)
         pixels[:, :, :3] = srgb_to_linear(pixels[:, :, :3])
     pixels = _upright(pixels, _attribute(spec, "Orientation", 1))
     edges = bool(_attribute(spec, "oiio:sampleborder", 0))
-    return np.ascontiguousarray(pixels), Facts(form, encoding, envmap, edges, exposure, notes)
+    colour = icc_to_rec709(_bytes(_attribute(spec, "ICCProfile", None))) if whole else []
+    return np.ascontiguousarray(pixels), Facts(form, encoding, envmap, edges, exposure, notes, colour)
 
 
 def _part(source: Any, notes: list[str]) -> tuple[int, Any, list[int]]:
@@ -162,10 +173,11 @@ def _check(spec: Any, limits: Limits) -> None:
     """Refuse sizes before anything is allocated."""
     if spec.width < 1 or spec.height < 1 or spec.depth > 1:
         raise Unreadable(f"its size of {spec.width} × {spec.height} × {spec.depth} is no picture's")
-    _size(spec.width, spec.height, spec.nchannels, limits)
+    check_size(spec.width, spec.height, spec.nchannels, limits)
 
 
-def _size(width: int, height: int, channels: int, limits: Limits) -> None:
+def check_size(width: int, height: int, channels: int, limits: Limits) -> None:
+    """Refuse what is larger than accepted: Unreadable."""
     megabytes = width * height * min(channels, 4) * 4 >> 20
     if width * height > limits.pixels or megabytes > limits.megabytes:
         raise Unreadable(
@@ -180,7 +192,7 @@ def _display(pixels: Pixels, spec: Any, limits: Limits, notes: list[str]) -> Pix
     window = (spec.full_x, spec.full_y, spec.full_width, spec.full_height)
     if data == window or spec.full_width < 1 or spec.full_height < 1:
         return pixels
-    _size(spec.full_width, spec.full_height, pixels.shape[2], limits)
+    check_size(spec.full_width, spec.full_height, pixels.shape[2], limits)
     left, top = spec.x - spec.full_x, spec.y - spec.full_y
     x0, x1 = max(left, 0), min(left + spec.width, spec.full_width)
     y0, y1 = max(top, 0), min(top + spec.height, spec.full_height)
@@ -247,12 +259,16 @@ def _attribute(spec: Any, name: str, default: Any) -> Any:
     return default if value is None else value
 
 
+def _bytes(value: object) -> bytes:
+    return bytes(value) if isinstance(value, np.ndarray) and value.dtype == np.uint8 else b""
+
+
 def _says_linear(space: object) -> bool:
     return str(space).lower().startswith(("lin", "scene-linear", "scene_linear"))
 
 
-def _failure(library: Any) -> str:
-    """The pending error of the library or of an open file, as the end of a sentence."""
+def _failure(library: Any, harmless: re.Pattern[str] | None = None) -> str:
+    """The pending error of the library or of an open file, as the end of a sentence; "" for harmless ones."""
     try:
         text = str(library.geterror())
     except UnicodeDecodeError:  # the message quotes the damaged header
@@ -261,5 +277,8 @@ def _failure(library: Any) -> str:
         return "it holds luminance and subsampled chroma; save it again as RGB"
     if "limits:" in text:
         return "its size is more than what is accepted, or it is damaged"
-    first = re.sub(r"EXR Error \(.*?\):\s*(EXR_ERR_\w+)?", "", text).strip().splitlines()
-    return first[0].strip().rstrip(".")[:200] if first else ""
+    lines = re.sub(r"EXR Error \(.*?\):\s*(EXR_ERR_\w+)?", "", text).strip().splitlines()
+    first = next((line for line in lines if not (harmless and harmless.search(line))), "")
+    if jpeg := re.match(r"JPEG error: (.*?)( \(\".*\"\))?$", first):
+        return f"it is damaged or incomplete ({jpeg[1]})"
+    return first.strip().rstrip(".")[:200]

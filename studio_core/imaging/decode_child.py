@@ -1,8 +1,9 @@
 """The decoder child: reads requests from stdin, answers with pixels on stdout.
 
-A request is a line of JSON, `{"path": …}`. The answer is a line of JSON, either `{"error": …}` or
-`{"shape": …, "dtype": …, "facts": …}`, and then the raw pixels. The process has a memory limit where
-the system knows one, writes nothing and has no state between requests.
+A request is a line of JSON, `{"path": …}`, with `"photograph": true` for the encoded numbers of one. The
+answer is a line of JSON, either `{"error": …}` or `{"shape": …, "dtype": …, "facts": …}`, and then the raw
+pixels. The process has a memory limit where the system knows one, writes nothing and has no state between
+requests.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ import sys
 import numpy as np
 
 from studio_core.imaging.decode import Limits, Unreadable, decode_file
+from studio_core.imaging.photograph_decode import decode_photograph
 
 
 def limit_memory(megabytes: int) -> None:
@@ -43,7 +45,9 @@ def main(pixels: int, megabytes: int) -> None:
     for line in sys.stdin.buffer:
         data = None
         try:
-            made, facts = decode_file(json.loads(line)["path"], limits)
+            request = json.loads(line)
+            decode = decode_photograph if request.get("photograph") else decode_file
+            made, facts = decode(request["path"], limits)
             answer = {
                 "shape": made.shape,
                 "dtype": str(made.dtype),

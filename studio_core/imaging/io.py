@@ -90,7 +90,7 @@ class ImageDecoder:
             raise InputError(f"{name} cannot be read: {error.strerror or error}") from None
         except ValueError as error:
             raise InputError(f"{name!r} cannot be read: {error}") from None
-        suffix = _suffix(start, path.suffix.lower())
+        suffix = suffix_of(start, path.suffix.lower())
         if suffix is None:
             raise InputError(f"{name} cannot be read: it is no picture of a known format")
         if suffix == ".hdr" and not parse_header(start).format:
@@ -107,7 +107,7 @@ class ImageDecoder:
 
     def decode(self, data: bytes, name: str) -> Image:
         """The picture in the bytes of a file, made finite; `name` is what messages call it."""
-        suffix = _suffix(data[:HEADER], Path(name).suffix.lower()[:8] if "\0" not in name else "")
+        suffix = suffix_of(data[:HEADER], Path(name).suffix.lower()[:8] if "\0" not in name else "")
         if suffix is None:
             raise InputError(f"{name} cannot be read: it is no picture of a known format")
         return _finite(*self._ask_bytes(data, suffix, name))
@@ -125,7 +125,15 @@ class ImageDecoder:
             copy.write_bytes(data)
             return self._ask(str(copy), name)
 
-    def _ask(self, path: str, name: str) -> tuple[npt.NDArray[Any], Facts]:
+    def photograph(self, data: bytes, suffix: str, name: str) -> tuple[npt.NDArray[Any], Facts]:
+        """Encoded numbers of a photograph in a file's bytes, and the facts (`photograph_decode`)."""
+        with tempfile.TemporaryDirectory(prefix="lucarne-") as folder:
+            copy = Path(folder) / f"picture{suffix}"
+            copy.write_bytes(data)
+            return self._ask(str(copy), name, photograph=True)
+
+    def _ask(self, path: str, name: str, *, photograph: bool = False) -> tuple[npt.NDArray[Any], Facts]:
+        request = {"path": path, "photograph": photograph}
         with self._lock:
             child = self._start()
             late = threading.Event()
@@ -138,7 +146,7 @@ class ImageDecoder:
             timer.daemon = True
             timer.start()
             try:
-                answer, pixels = self._exchange(child, path)
+                answer, pixels = self._exchange(child, request)
             except (OSError, EOFError, ValueError, KeyError, TypeError, MemoryError):
                 self._stop()
                 if late.is_set():
@@ -158,18 +166,18 @@ class ImageDecoder:
         return pixels, facts
 
     def _exchange(
-        self, child: subprocess.Popen[bytes], path: str
+        self, child: subprocess.Popen[bytes], request: dict[str, Any]
     ) -> tuple[dict[str, Any], npt.NDArray[Any] | None]:
         assert child.stdin is not None
         assert child.stdout is not None
-        child.stdin.write(json.dumps({"path": path}).encode() + b"\n")
+        child.stdin.write(json.dumps(request).encode() + b"\n")
         child.stdin.flush()
         line = child.stdout.readline(1 << 20)
         answer = json.loads(line)
         if "error" in answer:
             return answer, None
         height, width, channels = (int(n) for n in answer["shape"])
-        dtype = np.dtype({"uint8": np.uint8, "float32": np.float32}[answer["dtype"]])
+        dtype = np.dtype({"uint8": np.uint8, "uint16": np.uint16, "float32": np.float32}[answer["dtype"]])
         if not (0 < height * width <= self.limits.pixels and channels in (1, 3, 4)):
             raise ValueError("an impossible answer")
         pixels = np.empty((height, width, channels), dtype)
@@ -236,7 +244,7 @@ def read_image(
     return decoder.read(source)
 
 
-def _suffix(start: bytes, given: str) -> str | None:
+def suffix_of(start: bytes, given: str) -> str | None:
     """The extension by which the decoder library finds the format; the content decides."""
     for magic, suffixes in _MAGIC:
         if start.startswith(magic):

@@ -41,13 +41,16 @@ class ShotFacts:
 class Photograph:
     """(H, W, 3) upright pixels: uint8 or uint16 as encoded by the camera, or float32 linear.
 
-    `digest` names the file's content; `notes` are sentences on what was converted.
+    `digest` names the file's content; `notes` are sentences on what was converted. `colour`: the nine numbers
+    of a matrix, rows first, that makes linear Rec.709 of these numbers once they are linear light; empty
+    where they are Rec.709's or nothing is said (phones often write Display P3).
     """
 
     pixels: npt.NDArray[Any]
     facts: ShotFacts
     digest: str
     notes: tuple[str, ...] = ()
+    colour: tuple[float, ...] = ()
 
     @property
     def kind(self) -> Literal["8 bit", "16 bit", "linear"]:
@@ -60,3 +63,15 @@ class Photograph:
     def size(self) -> tuple[int, int]:
         """Width and height."""
         return self.pixels.shape[1], self.pixels.shape[0]
+
+
+def in_rec709(light: npt.NDArray[np.float32], colour: tuple[float, ...]) -> npt.NDArray[np.float32]:
+    """Linear light (..., 3) of a photograph's own primaries as Rec.709 (`Photograph.colour`).
+
+    Colours that Rec.709 cannot show would have a negative part; it becomes 0.
+    """
+    if not colour:
+        return light
+    matrix = np.asarray(colour, np.float32).reshape(3, 3)
+    made: npt.NDArray[np.float32] = np.maximum(light @ matrix.T, np.float32(0))
+    return made

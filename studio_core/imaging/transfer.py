@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import struct
 from collections.abc import Sequence
 from typing import Any
 
@@ -73,3 +74,31 @@ def to_rec709(
     adapt = np.linalg.inv(_BRADFORD) @ np.diag(wanted / seen) @ _BRADFORD
     made: npt.NDArray[np.float64] = np.linalg.inv(target) @ adapt @ source
     return made
+
+
+_SRGB_D50 = np.array([[0.4361, 0.3851, 0.1431], [0.2225, 0.7169, 0.0606], [0.0139, 0.0971, 0.7141]])
+"""Colorants of sRGB's ICC profile: XYZ of red, green and blue in columns, adapted to D50."""
+
+
+def icc_to_rec709(profile: bytes) -> list[float]:
+    """Nine numbers, rows first, of the matrix from a profile's linear RGB to linear Rec.709.
+
+    Empty where the profile's primaries are Rec.709's within 0.01, or it is no matrix profile of RGB. Source:
+    ICC.1:2022, sections 7.2, 9.2.
+    """
+    if profile[16:20] != b"RGB " or len(profile) < 132:
+        return []
+    colorants = {}
+    for index in range(min(struct.unpack_from(">I", profile, 128)[0], 100)):
+        entry = profile[132 + 12 * index : 144 + 12 * index]
+        if len(entry) == 12 and entry[:4] in (b"rXYZ", b"gXYZ", b"bXYZ"):
+            at = struct.unpack_from(">I", entry, 4)[0]
+            body = profile[at : at + 20]
+            if len(body) == 20 and body[:4] == b"XYZ ":
+                colorants[entry[:1]] = np.array(struct.unpack_from(">3i", body, 8)) / 65536
+    if len(colorants) < 3:
+        return []
+    matrix = np.linalg.solve(_SRGB_D50, np.stack([colorants[c] for c in (b"r", b"g", b"b")], axis=1))
+    if np.abs(matrix - np.eye(3)).max() < 0.01 or np.abs(matrix.sum(axis=1) - 1).max() > 0.05:
+        return []
+    return [float(v) for v in matrix.ravel()]
