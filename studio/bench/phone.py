@@ -123,7 +123,7 @@ class Truth:
     """`rotation` (3, 3): front lens' frame from the back lens'; `room_from_front`: the map's frame from it.
 
     `reference`: index of the shot that does not shake (the middle one). `clipped`: share of the map's energy
-    that is beyond what the darkest shot of both sides resolves.
+    that is beyond what the darkest shot of both sides resolves. `scale`: exposure of light 1 at EV 0.
     """
 
     phone: Phone
@@ -133,6 +133,7 @@ class Truth:
     back: SideTruth
     reference: int = 0
     clipped: float = 0.0
+    scale: float = 1.0
 
     def side(self, side: str) -> SideTruth:
         """By its name."""
@@ -208,8 +209,11 @@ def shoot(environment: F32, phone: Phone, seed: int = 0) -> Shots:
         shots[side] = tuple(made)
         motions = tuple(_motion(shake) for shake in shakes)
         sides[side] = replace(one, moved=moved, evs=evs, listed=listed, shakes=shakes, motions=motions)
-    clipped = _clipped(environment, scale * 2.0 ** min(phone.evs))
-    truth = replace(truth, front=sides[FRONT], back=sides[BACK], reference=reference, clipped=clipped)
+    darkest = min(phone.evs) + min(phone.back_ev, 0.0)
+    clipped = clipped_share(environment, scale * 2.0**darkest)
+    truth = replace(
+        truth, front=sides[FRONT], back=sides[BACK], reference=reference, clipped=clipped, scale=scale
+    )
     return Shots(shots[FRONT], shots[BACK], truth)
 
 
@@ -298,7 +302,8 @@ def _motion(shake: F64) -> Motion:
     return Motion(rotation=(x, y, z))
 
 
-def _clipped(environment: F32, exposure: float) -> float:
+def clipped_share(environment: F32, exposure: float) -> float:
+    """Energy of a map, as a share, that `exposure` (of light 1) does not resolve: where it is over 1."""
     from studio_core.imaging.latlong import pixel_solid_angles
 
     area = pixel_solid_angles(*environment.shape[:2])[:, None, None]

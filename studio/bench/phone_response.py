@@ -1,12 +1,14 @@
 """How the simulated phone turns light into numbers, and the exact inverse as the truth.
 
 Exposure is light × 2^EV, 1 where the sensor is full. Families: `sRGB`, `gamma`, `filmic` (an S-shaped curve
-with toe and shoulder), `per channel` (each colour its own contrast), `linear`.
+with toe and shoulder), `per channel` (each colour its own contrast; a middle grey stays grey, as white
+balance sees to), `linear`.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -32,24 +34,35 @@ class Curve:
 
     def encode(self, exposure: npt.NDArray[Any], channel: int) -> F64:
         """Numbers 0 … 1 of exposures, for a channel; what is below 0 or above 1 is clipped."""
-        x = np.clip(np.asarray(exposure, np.float64), 0.0, 1.0)
+        x = np.clip(np.asarray(exposure, np.float64) * self.gains[channel], 0.0, 1.0)
+        return self.pedestal + (1 - self.pedestal) * self._shape(x, channel)
+
+    def _shape(self, x: F64, channel: int) -> F64:
         match self.family:
             case "sRGB":
-                made = np.where(x <= 0.0031308, 12.92 * x, 1.055 * x ** (1 / 2.4) - 0.055)
+                return np.where(x <= 0.0031308, 12.92 * x, 1.055 * x ** (1 / 2.4) - 0.055)
             case "gamma":
-                made = _gamma(x, self.gamma)
+                return _gamma(x, self.gamma)
             case "filmic":
-                made = _sigmoid(_gamma(x, self.gamma), self.contrast)
+                return _sigmoid(_gamma(x, self.gamma), self.contrast)
             case "per channel":
                 gamma = self.gamma * (1.0, 0.93, 1.08)[channel]
-                made = _sigmoid(_gamma(x, gamma), self.contrast * (0.6, 0.35, 0.8)[channel])
+                return _sigmoid(_gamma(x, gamma), self.contrast * (0.6, 0.35, 0.8)[channel])
             case _:
-                made = x
-        return self.pedestal + (1 - self.pedestal) * made
+                return x
+
+    @cached_property
+    def gains(self) -> tuple[float, ...]:
+        """Of red, green and blue before the curve, 1 at least: grey has three equal numbers in the middle."""
+        if self.family != "per channel":
+            return (1.0, 1.0, 1.0)
+        at = np.linspace(0, 1, _DENSE) ** 3
+        middle = [float(np.interp(0.5, self._shape(at, channel), at)) for channel in range(3)]
+        return tuple(m / min(middle) for m in middle)
 
     def exposure(self, numbers: npt.ArrayLike, channel: int) -> F64:
         """The exposures 0 … 1 that give numbers 0 … 1 (what `encode` undoes)."""
-        at = np.linspace(0, 1, _DENSE) ** 3  # dense where curves are steep
+        at = np.linspace(0, 1, _DENSE) ** 3 / self.gains[channel]  # dense where curves are steep
         return np.asarray(
             np.interp(np.asarray(numbers, np.float64), self.encode(at, channel), at), np.float64
         )

@@ -16,6 +16,7 @@ SUITES = {
         "cuts": "studio.bench.cuts",
         "window": "studio.bench.window",
         "photograph": "studio.bench.photograph",
+        "capture": "studio.bench.capture",
     },
     "stress": {"ui": "studio.bench.stress_ui"},
 }

@@ -65,14 +65,16 @@ def test_without_misalignment_the_back_lens_looks_the_other_way() -> None:
 @pytest.mark.parametrize("family", FAMILIES)
 def test_numbers_give_back_the_exposure(family: str) -> None:
     curve = Curve(family, 2.1, 0.7, pedestal=0.05)
-    x = np.linspace(0.001, 1, 300)
     for channel in range(3):
+        x = np.linspace(0.001, 1 / curve.gains[channel], 300)
         numbers = curve.encode(x, channel)
         assert (np.diff(numbers) > 0).all()
         assert curve.encode(np.array([0.0, 1.0, 9.0]), channel) == pytest.approx([0.05, 1, 1])
         np.testing.assert_allclose(curve.exposure(numbers, channel), x, rtol=2e-3)
     log = curve.log_exposure(257)
     assert log[:, 128] == pytest.approx([0, 0, 0], abs=1e-12)
+    grey = [float(curve.exposure(0.525, channel)) for channel in range(3)]
+    assert grey == pytest.approx([grey[1]] * 3, rel=1e-3)
 
 
 def test_photographs_are_the_light_through_exposure_and_response() -> None:

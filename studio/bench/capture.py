@@ -1,0 +1,257 @@
+"""`lucarne bench capture`: rooms that are known, photographed by a simulated phone, captured and compared.
+
+Rows MAP/CASE are over the HDR maps of the shared data, each photographed by several random phones of the set
+that nothing was tuned on; figures are those of the worst phone, their spread half the range over phones. What
+the metrics are stands in benchmarks/README.md.
+"""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from studio.bench import capture_measure as measure
+from studio.bench.harness import Report
+from studio.bench.phone import Phone, Shots, shoot
+from studio.bench.phone_random import random_phone
+from studio.headless import Headless
+from studio_core.capturing.artifacts import CaptureState
+from studio_core.capturing.settings import (
+    BACK,
+    FRONT,
+    SIDES,
+    BracketSettings,
+    CaptureSettings,
+    LensSettings,
+    ReflectionSettings,
+    Shot,
+    StitchSettings,
+)
+
+F32 = npt.NDArray[np.float32]
+IN_PARTS = True
+CAPTURER = "fisheye"
+MAPS = {
+    "interior": "cc0/hdri_polyhaven_cc0/interior.exr",
+    "courtyard": "cc0/hdri_polyhaven_cc0/courtyard.exr",
+    "studio": "cc0/hdri_polyhaven_cc0/studio.exr",
+    "sunset": "cc0/hdri_polyhaven_cc0/sunset.exr",
+    "KernerEnv": "third_party/openexr_env/KernerEnvLatLong.exr",
+}
+LADDERS = ((-2.0, 0.0, 2.0), (-4.0, -2.0, 0.0, 2.0, 4.0), (-6.0, -4.0, -2.0, 0.0, 2.0))
+COVERED = 0.005
+"""Share of a room's energy beyond the darkest exposure, under which its range counts as captured."""
+
+
+@dataclass(frozen=True)
+class Setup:
+    """How much is measured: phones a map, pixels of the circle's radius, columns of the environment."""
+
+    phones: int = 3
+    radius: float = 420.0
+    width: int = 1024
+    captures: int = 200
+    clone: tuple[int, int] = (1000, 1000)
+    megapixels: float = 12.0
+
+
+QUICK = Setup(phones=1, radius=220.0, width=512, captures=24, clone=(500, 500), megapixels=1.0)
+
+
+def run(report: Report, program: Headless) -> None:
+    """All cases; those over maps are left out, saying so, where the maps are not there."""
+    setup = QUICK if report.quick else Setup()
+    maps = dict(found_maps())
+    if not maps:
+        report.notes.append("The shared HDR maps are not there (LUCARNE_TEST_DATA): no rows over maps.")
+    for index, (name, path) in enumerate(maps.items()):
+        wanted = [case for case in CASES if report.wants(f"{name}/{case}")]
+        if wanted:
+            room = read_map(path)
+            _over_phones(report, program, setup, name, room, index, wanted)
+            report.keep()
+    _others(report, program, setup, maps)
+
+
+def _others(report: Report, program: Headless, setup: Setup, maps: Mapping[str, Path]) -> None:
+    from studio.bench import capture_clone, capture_pipeline
+
+    if report.wants("clone"):
+        capture_clone.measure(report, setup.clone)
+        report.keep()
+    if report.wants("pipeline") and maps:
+        room = read_map(next(iter(maps.values())))
+        with tempfile.TemporaryDirectory(prefix="lucarne-bench-") as folder:
+            capture_pipeline.measure(report, program, room, setup.megapixels, Path(folder))
+        report.keep()
+
+
+def found_maps() -> Iterable[tuple[str, Path]]:
+    """Names and files of the maps that are there."""
+    folder = Path(os.environ.get("LUCARNE_TEST_DATA") or Path(__file__).parents[2].parent / "shared" / "data")
+    return [(name, folder / path) for name, path in MAPS.items() if (folder / path).is_file()]
+
+
+def read_map(path: Path) -> F32:
+    """(H, 2H, 3) finite light."""
+    from studio_core.imaging.environment import load_environment
+
+    image, _ = load_environment(path)
+    return image.pixels
+
+
+def ladder_of(room: F32, phone: Phone) -> tuple[float, ...]:
+    """The first ladder whose darkest exposure clips less than `COVERED` of the energy, or the last."""
+    from studio.bench.phone import clipped_share
+
+    middle = float(np.median(room.mean(axis=2)))
+    for evs in LADDERS:
+        darkest = min(evs) + min(0.0, phone.back_ev)
+        if clipped_share(room, phone.key / middle * 2.0**darkest) < COVERED:
+            return evs
+    return LADDERS[-1]
+
+
+@dataclass(frozen=True)
+class Case:
+    """`removal`: of reflections; `wrong`: a listed step is wrong by up to 1 EV."""
+
+    removal: bool = True
+    wrong: bool = False
+
+
+CASES = {
+    "default": Case(),
+    "no-removal": Case(removal=False),
+    "wrong-table": Case(wrong=True),
+}
+
+
+def settings_for(case: Case, phone: Phone, width: int) -> CaptureSettings:
+    """What a designer who knows the lens' model and about its field of view would leave as it is."""
+    lens = LensSettings(
+        model=phone.lens.model, fov=float(round(phone.lens.fov / 5) * 5), coefficients=phone.lens.coefficients
+    )
+    return CaptureSettings(
+        lens=lens,
+        reflections=ReflectionSettings(automatic=case.removal),
+        stitch=StitchSettings(width=width, level=False),
+    )
+
+
+def with_sides(settings: CaptureSettings, shots: Shots) -> CaptureSettings:
+    """Which photographs are front and back is told."""
+    told = [Shot(p.digest, FRONT) for p in shots.front] + [Shot(p.digest, BACK) for p in shots.back]
+    return replace(settings, bracket=BracketSettings(shots=tuple(told)))
+
+
+def wrong_table(phone: Phone, seed: int) -> tuple[Phone, str, int]:
+    """A phone whose files list one step wrong by 0.5 … 1 EV; the side, and the shot after that step."""
+    rng = np.random.default_rng([seed, 3])
+    count = len(phone.evs)
+    side, after = int(rng.integers(2)), int(rng.integers(1, count))
+    error = float(rng.uniform(0.5, 1.0) * rng.choice([-1, 1]))
+    errors = [(0.0,) * count, (0.0,) * count]
+    errors[side] = (0.0,) * after + (error,) * (count - after)
+    return replace(phone, listed_errors=(errors[0], errors[1])), SIDES[side], after
+
+
+def _over_phones(
+    report: Report, program: Headless, setup: Setup, name: str, room: F32, index: int, wanted: list[str]
+) -> None:
+    found: dict[tuple[str, str], list[float]] = {}
+    details: dict[str, list[dict[str, object]]] = {}
+    for seed in range(setup.phones):
+        phone = random_phone(100 * index + seed, tuned=False, radius=setup.radius, reflections=True)
+        phone = replace(phone, evs=ladder_of(room, phone))
+        right = shoot(room, phone, seed) if set(wanted) - {"wrong-table"} else None
+        for kind in wanted:
+            case, wrong = CASES[kind], None
+            shots = right
+            if case.wrong:
+                lying, side, after = wrong_table(phone, seed)
+                shots, wrong = shoot(room, lying, seed), (side, after)
+            assert shots is not None
+            case_name = f"{name}/{kind}"
+            with program.job(f"{case_name} {seed + 1}/{setup.phones}") as job:
+                capture = program.registry.get("capturer", CAPTURER).open(program.services)
+                settings = with_sides(settings_for(case, phone, setup.width), shots)
+                state: CaptureState = capture.run((*shots.front, *shots.back), settings, job)
+            for metric, value in measured(state, shots, room, wrong).items():
+                found.setdefault((case_name, metric), []).append(value)
+            details.setdefault(case_name, []).append(
+                {"phone": seed, "evs": list(phone.evs), "notes": list(state.notes)}
+            )
+    for (case_name, metric), values in found.items():
+        worst = min(values) if metric in ("wrong_named", "compared") else max(values)
+        report.add(case_name, metric, worst, UNITS.get(metric, "1"), (max(values) - min(values)) / 2)
+    for case_name, told in details.items():
+        report.details[case_name] = told
+
+
+UNITS = {
+    "pixel_log2_median": "stop",
+    "pixel_log2_p95": "stop",
+    "registration_deg": "°",
+    "fov_error": "°",
+    "response_log2": "stop",
+    "exposure_ev_max": "EV",
+}
+
+
+def measured(
+    state: CaptureState, shots: Shots, room: F32, wrong: tuple[str, int] | None = None
+) -> dict[str, float]:
+    """All metrics of a capture by name."""
+    truth = shots.truth
+    assert state.captured is not None
+    turned = measure.finished_from_room(state, truth)
+    made = state.captured.environment.pixels
+    limit = captured_light(room, shots)
+    pixels = measure.pixel_error(state, limit, truth, turned)
+    values = {
+        "irradiance_rel_rmse": measure.irradiance_error(made, limit, turned),
+        "irradiance_whole_rel_rmse": measure.irradiance_error(made, room, turned),
+        "clipped_energy": truth.clipped,
+        "pixel_log2_median": pixels.median,
+        "pixel_log2_p95": pixels.p95,
+        "compared": pixels.share,
+        "exposure_ev_max": measure.exposure_error(state, truth),
+        "nonfinite": float(measure.nonfinite(state)),
+    }
+    if state.registration is not None:
+        values["registration_deg"] = measure.angle_between(state.registration.rotation, truth.rotation)
+        values["fov_error"] = abs(state.registration.lens.fov - truth.phone.lens.fov)
+    if state.response is not None:
+        response = measure.response_error(state.response, truth.phone.curve)
+        values["response_rms"], values["response_log2"] = response.rms, response.log2
+    if wrong is not None:
+        values["wrong_named"] = float(_named(state, *wrong))
+    return values
+
+
+def captured_light(room: F32, shots: Shots) -> F32:
+    """The room as far as its range was captured: brighter light is what fills the darkest exposure."""
+    phone, truth = shots.truth.phone, shots.truth
+    darkest = min(phone.evs)
+    height, width = room.shape[:2]
+    from studio_core.imaging.latlong import equirect_direction
+
+    u, v = np.meshgrid((np.arange(width) + 0.5) / width, (np.arange(height) + 0.5) / height)
+    in_front = -(equirect_direction(u, v) @ truth.room_from_front)[..., 2] > 0
+    ev = np.where(in_front, darkest, darkest + phone.back_ev)[:, :, None]
+    full = 1 / (truth.scale * 2.0**ev * np.array(phone.curve.gains))
+    return np.minimum(room, full.astype(np.float32))
+
+
+def _named(state: CaptureState, side: str, after: int) -> bool:
+    """Whether the step before shot `after` of `side` is named, and nothing else is."""
+    wrong = {one: set(light.exposures.wrong) for one, light in state.lights.items()}
+    hit = wrong.pop(side, set())
+    return bool(hit) and hit <= {after - 1, after} and not any(wrong.values())
