@@ -132,7 +132,9 @@ class Registration:
     """`rotation` (3, 3): front lens' frame from the back lens' frame. `gain`: front = gain · back (3,).
 
     `falloff` (3,): light at s = θ / θ_max is 1 + a s² + b s⁴ + c s⁶ of the axis'. `spread`: median angle
-    between what both show after registration, degrees; `matches` were used.
+    between what both show after registration, degrees; `matches` were used; `doubt`: standard deviation of
+    the rotation about its least certain axis, degrees. `front`, `back`: the circles, their centres moved so
+    that both lenses fit together; None: as they were.
     """
 
     rotation: F64
@@ -143,6 +145,9 @@ class Registration:
     matches: int
     trusted: bool
     notes: tuple[str, ...] = ()
+    front: Circle | None = None
+    back: Circle | None = None
+    doubt: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,0 +1,146 @@
+"""Light lost towards a lens' edge, and how much brighter one lens' picture is, from what both lenses see.
+
+A direction that lies at s = θ / θ_max in one lens lies at about 2 · 90° / θ_max − s in the other: the ratio
+of both tells how steeply light falls near the edge, and hardly more. How it falls further inside is assumed
+to lie between the square (cos⁴-like) and the sixth power of s, the loss being (1 − u − v) s² + u s⁴ + v s⁶
+of its whole with u near 0.35 and v near 0.1; the overlap decides where it says more than that.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from studio_core.capturing.artifacts import F64
+from studio_plugins.capture.overlap import Stand, Strip, across, padded, ways
+
+_BINS, _SECTORS = 24, 12
+_EDGE = 0.985  # of θ_max: further out the circle's soft border begins
+_SHAPE = (0.35, 0.1)
+_SHAPE_SPREAD = (0.15, 0.1)
+_ROUGH = 0.006  # what a bin's median may be wrong by beyond its noise, in ln
+_LOSS_SPREAD = 0.35
+_MOST = 0.85
+_FEW = 20
+
+
+@dataclass(frozen=True, eq=False)
+class Balance:
+    """`gain` (3,): front = gain · back. `falloff`: light at s is 1 + a s² + b s⁴ + c s⁶. `doubt`: standard
+    deviation of the light lost at the edge. `off`: what ratios still differ by, median, log2."""
+
+    gain: F64
+    falloff: tuple[float, float, float]
+    doubt: float
+    off: float
+
+    @property
+    def loss(self) -> float:
+        """Share of the light that is lost at the edge."""
+        return -sum(self.falloff)
+
+
+def light_at(falloff: tuple[float, float, float], s: F64) -> F64:
+    """Share of the axis' light at s = θ / θ_max."""
+    square = np.asarray(s, np.float64) ** 2
+    a, b, c = falloff
+    return np.asarray(1 + square * (a + square * (b + square * c)), np.float64)
+
+
+def from_loss(loss: float) -> tuple[float, float, float]:
+    """The falloff whose light is less by `loss` (0 … 1) at the edge, of the usual shape."""
+    u, v = _SHAPE
+    return -loss * (1 - u - v), -loss * u, -loss * v
+
+
+def balanced(front: Strip, back: Strip, stand: Stand, loss: float | None = None) -> Balance | None:
+    """What makes both lenses' light the same where both see it; None where too little is seen by both.
+
+    `loss`: of light at the edge where it is known; then only the gain is sought.
+    """
+    from scipy.optimize import least_squares
+
+    ratio, here, there, noise = _ratios(front, back, stand)
+    if len(ratio) < _FEW:
+        return None
+
+    def shape(x: F64) -> tuple[float, float, float]:
+        if loss is not None:
+            return from_loss(loss)
+        whole, u, v = x[3:]
+        return -whole * (1 - u - v), -whole * u, -whole * v
+
+    def left(x: F64) -> F64:
+        falloff = shape(x)
+        fall = np.log(np.maximum(light_at(falloff, here), 0.02)) - np.log(
+            np.maximum(light_at(falloff, there), 0.02)
+        )
+        return np.asarray((ratio - fall[:, None] - x[:3]) / noise, np.float64)
+
+    def terms(x: F64) -> F64:
+        """Robust in the data only: pseudo-Huber by hand, priors as they are."""
+        some = left(x).ravel()
+        soft = np.sign(some) * np.sqrt(2 * (np.sqrt(1 + (some / 1.5) ** 2) - 1)) * 1.5
+        if loss is not None:
+            return np.asarray(soft, np.float64)
+        prior = [x[3] / _LOSS_SPREAD, *((x[4:] - _SHAPE) / _SHAPE_SPREAD)]
+        return np.concatenate([soft, prior])
+
+    first = np.median(ratio, axis=0)
+    if loss is not None:
+        found = least_squares(terms, first)
+    else:
+        start = np.concatenate([first, [0.1, *_SHAPE]])
+        low = [*(first - 3), 0.0, 0.0, 0.0]
+        high = [*(first + 3), _MOST, 0.8, 0.6]
+        found = least_squares(terms, start, bounds=(low, high), x_scale=[0.1, 0.1, 0.1, 0.1, 0.1, 0.1])
+    doubt = 0.0
+    if loss is None:
+        spread = np.linalg.pinv(found.jac.T @ found.jac)
+        doubt = math.sqrt(max(float(spread[3, 3]), 0.0))
+    off = float(np.median(np.abs(left(found.x) * noise))) / math.log(2)
+    return Balance(np.exp(found.x[:3]), shape(found.x), doubt, off)
+
+
+def _ratios(front: Strip, back: Strip, stand: Stand) -> tuple[F64, F64, F64, F64]:
+    """Medians over pieces of the overlap: ln front / back (N, 3), s in both lenses (N,), noise (N, 1)."""
+    import cv2
+
+    at = front.grid()
+    there = across(front, back, at, stand)
+    x, y = back.pixels(there)
+    usable = cv2.remap(
+        padded(back.usable.astype(np.float32)), x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT
+    )
+    other = np.asarray(cv2.remap(padded(back.light), x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE))
+    half = math.radians(stand.fov) / 2
+    s_front = np.arccos(np.clip(-ways(front, at, stand)[..., 2], -1, 1)) / half
+    turned = ways(back, there, stand)
+    s_back = np.arccos(np.clip(turned[..., 2], -1, 1)) / half
+    both = front.usable & (np.asarray(usable) > 0.99) & (s_front < _EDGE) & (s_back < _EDGE)
+    empty = np.zeros((0, 3)), np.zeros(0), np.zeros(0), np.zeros((0, 1))
+    if both.sum() < 100:
+        return empty
+    ratio = (front.light - other)[both] * math.log(2)
+    a, s_front, s_back = at[..., 0][both], s_front[both], s_back[both]
+    apart = s_front - s_back
+    low, high = apart.min(), apart.max()
+    bins = np.minimum(((apart - low) / max(high - low, 1e-9) * _BINS).astype(np.intp), _BINS - 1)
+    sector = np.minimum((a / (2 * math.pi) * _SECTORS).astype(np.intp), _SECTORS - 1)
+    group = bins * _SECTORS + sector
+    order = np.argsort(group, kind="stable")
+    cuts = np.flatnonzero(np.diff(group[order])) + 1
+    made = []
+    for part in np.split(order, cuts):
+        if len(part) < 12:
+            continue
+        middle = np.median(ratio[part], axis=0)
+        scatter = 1.48 * np.median(np.abs(ratio[part] - middle))
+        made.append((*middle, s_front[part].mean(), s_back[part].mean(), scatter, len(part)))
+    if not made:
+        return empty
+    table = np.array(made)
+    noise = np.hypot(_ROUGH, 1.25 * table[:, 5] / np.sqrt(table[:, 6] / 9))  # neighbours are alike
+    return table[:, :3], table[:, 3], table[:, 4], noise[:, None]

@@ -1,0 +1,215 @@
+"""What two lenses back to back both see: their rims unrolled side by side, and how points of them belong.
+
+Each lens' rim is unrolled into a strip of azimuth a × angle t. The front lens' is polar: a from its right
+over its top, t from its axis. The back lens' frame is first turned by half a turn about y, so that both
+strips show the same at the same place when the lenses stand exactly back to back. Strips are made once, with
+the lens as it is given; what a `Stand` changes (field of view, centres) moves places in them, not pixels.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from studio_core.capturing.artifacts import F32, F64, Mask, View
+from studio_core.colour import LUMINANCE
+from studio_core.imaging.projection import Circle, Lens, project
+
+HALF_TURN = np.diag([-1.0, 1.0, -1.0])
+_FINER = 1.5
+_FLOOR = 1e-4
+
+
+@dataclass(frozen=True, eq=False)
+class Strip:
+    """A lens' rim (rows of t, columns of a): log2 luminance, log2 of the channels, where it is usable.
+
+    `first`: radians at the upper edge of the first row; `step`: radians a pixel both ways. `turned`: the back
+    lens'. `lens` and `circle` are those it was unrolled with.
+    """
+
+    tone: F32
+    light: F32
+    usable: Mask
+    first: float
+    step: float
+    turned: bool
+    lens: Lens
+    circle: Circle
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Rows and columns."""
+        return self.tone.shape[0], self.tone.shape[1]
+
+    def pixels(self, places: F64) -> tuple[F32, F32]:
+        """Columns and rows for cv2.remap (pixel centres are whole), a wrapped into the padded strip."""
+        column = np.mod(places[..., 0] / self.step, self.shape[1]) - 0.5 + PAD
+        row = (places[..., 1] - self.first) / self.step - 0.5
+        return np.asarray(column, np.float32), np.asarray(row, np.float32)
+
+    def grid(self) -> F64:
+        """(rows, columns, 2): a and t of all pixels."""
+        rows, columns = self.shape
+        a, t = np.meshgrid(
+            (np.arange(columns) + 0.5) * self.step, self.first + (np.arange(rows) + 0.5) * self.step
+        )
+        return np.stack([a, t], axis=-1)
+
+
+PAD = 8
+"""Columns that `padded` repeats at both ends."""
+
+
+def padded(picture: F32) -> F32:
+    """A strip's picture with `PAD` columns more at both ends, as it closes in itself."""
+    return np.concatenate([picture[:, -PAD:], picture, picture[:, :PAD]], axis=1)
+
+
+@dataclass(frozen=True, eq=False)
+class Stand:
+    """How two lenses stand: `turn` (3, 3) front's frame from the back's after its half turn, fov in degrees.
+
+    `front`, `back` (2,): how far the circles' centres lie from where they were said to be, in radii.
+    """
+
+    turn: F64
+    fov: float
+    front: F64 = field(default_factory=lambda: np.zeros(2))
+    back: F64 = field(default_factory=lambda: np.zeros(2))
+
+
+def shrunk(light: F32, usable: Mask, size: tuple[int, int]) -> tuple[F32, F32]:
+    """Usable light averaged to a picture of `size` (width, height), and what share of each was usable."""
+    import cv2
+
+    shown = np.where(usable[..., None], light, np.float32(0))
+    share = np.asarray(cv2.resize(usable.astype(np.float32), size, interpolation=cv2.INTER_AREA), np.float32)
+    mean = np.asarray(cv2.resize(shown, size, interpolation=cv2.INTER_AREA), np.float32)
+    mean /= np.maximum(share, np.float32(1e-6))[..., None]
+    return mean, share
+
+
+def unroll(view: View, turned: bool, inner: float, per_degree: float) -> Strip:
+    """A lens' rim from the angle `inner` (radians from its axis) to its edge, `per_degree` pixels a degree.
+
+    Light is averaged where the photograph is finer.
+    """
+    import cv2
+
+    step = math.radians(1) / per_degree
+    columns = round(2 * math.pi / step)
+    step = 2 * math.pi / columns
+    rows = max(8, math.ceil((view.lens.half - inner) / step))
+    first = math.pi - view.lens.half if turned else view.lens.half - rows * step
+    circle: Circle = view.circle
+    light: F32 = view.light
+    share: F32 = view.usable.astype(np.float32)
+    finer = circle.radius / view.lens.half * step
+    if finer > _FINER:
+        x0, y0 = max(0, int(circle.x - circle.radius) - 2), max(0, int(circle.y - circle.radius) - 2)
+        cut = np.s_[y0 : int(circle.y + circle.radius) + 3, x0 : int(circle.x + circle.radius) + 3]
+        height, width = light[cut].shape[:2]
+        small = max(1, round(width / finer)), max(1, round(height / finer))
+        light, share = shrunk(light[cut], view.usable[cut], small)
+        scale = np.array([small[0] / width, small[1] / height])
+        offset = np.array([x0, y0])
+    else:
+        scale, offset = np.ones(2), np.zeros(2)
+    empty = np.empty((0, 0), np.float32)
+    strip = Strip(
+        np.empty((rows, columns), np.float32), empty, empty > 0, first, step, turned, view.lens, circle
+    )
+    points, _ = project(view.lens, circle, _polar(strip.grid()) @ (HALF_TURN if turned else np.eye(3)))
+    x, y = np.moveaxis(((points - offset) * scale - 0.5).astype(np.float32), -1, 0)
+    x, y = np.ascontiguousarray(x), np.ascontiguousarray(y)
+    seen = cv2.remap(share, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT)
+    made = np.asarray(cv2.remap(light, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE), np.float32)
+    usable = np.asarray(seen > 0.99)
+    luminance = made @ np.array(LUMINANCE, np.float32)
+    some = luminance[usable]
+    floor = _FLOOR * float(np.median(some)) if some.size else 1.0
+    tone = np.log2(np.maximum(luminance, max(floor, 1e-20))).astype(np.float32)
+    channels = np.log2(np.maximum(made, max(floor, 1e-20))).astype(np.float32)
+    usable &= luminance > floor
+    return Strip(tone, channels, usable, first, step, turned, view.lens, circle)
+
+
+def _polar(places: F64) -> F64:
+    """(..., 3) directions of places (..., 2): a and t."""
+    a, t = places[..., 0], places[..., 1]
+    ring = np.sin(t)
+    return np.stack([ring * np.cos(a), ring * np.sin(a), -np.cos(t)], axis=-1)
+
+
+def ways(strip: Strip, places: F64, stand: Stand) -> F64:
+    """Unit directions (..., 3) of places (..., 2) in a strip, in its lens' (turned) frame."""
+    shift = stand.back if strip.turned else stand.front
+    lens = strip.lens if stand.fov == strip.lens.fov else strip.lens.with_fov(stand.fov)
+    if lens is strip.lens and not shift.any():
+        return _polar(places)
+    a, t = places[..., 0], places[..., 1]
+    if strip.turned:
+        a, t = math.pi - a, math.pi - t
+    reach = strip.lens.radius_of(t)
+    right, down = reach * np.cos(a) - shift[0], -reach * np.sin(a) - shift[1]
+    reach = np.hypot(right, down)
+    theta = lens.angle_of(reach)
+    a = np.arctan2(-down, right)
+    if strip.turned:
+        a, theta = math.pi - a, math.pi - theta
+    return _polar(np.stack([a, theta], axis=-1))
+
+
+def places(strip: Strip, directions: F64, stand: Stand) -> F64:
+    """Where directions (..., 3) of a lens' (turned) frame lie in its strip: (..., 2), a of any turn."""
+    x, y, z = directions[..., 0], directions[..., 1], directions[..., 2]
+    a, theta = np.arctan2(y, x), np.arctan2(np.hypot(x, y), -z)
+    shift = stand.back if strip.turned else stand.front
+    lens = strip.lens if stand.fov == strip.lens.fov else strip.lens.with_fov(stand.fov)
+    if lens is strip.lens and not shift.any():
+        return np.stack([a, theta], axis=-1)
+    if strip.turned:
+        a, theta = math.pi - a, math.pi - theta
+    reach = lens.radius_of(theta)
+    right, down = reach * np.cos(a) + shift[0], -reach * np.sin(a) + shift[1]
+    theta = strip.lens.angle_of(np.hypot(right, down))
+    a = np.arctan2(-down, right)
+    if strip.turned:
+        a, theta = math.pi - a, math.pi - theta
+    return np.stack([a, theta], axis=-1)
+
+
+def across(front: Strip, back: Strip, at: F64, stand: Stand) -> F64:
+    """Places (..., 2) in the back lens' strip of what the front lens' strip shows at places `at`."""
+    return places(back, ways(front, at, stand) @ stand.turn, stand)
+
+
+def flattened(strip: Strip, degrees: float) -> F32:
+    """log2 luminance without what changes over more than `degrees`; 0 where nothing is usable."""
+    import cv2
+
+    sigma = math.radians(degrees) / strip.step
+    size = int(3 * sigma) * 2 + 1
+    weight = strip.usable.astype(np.float32)
+    tone = np.where(strip.usable, strip.tone, np.float32(0))
+    wide = size // 2
+    both = np.concatenate([(tone * weight)[..., None], weight[..., None]], axis=2)
+    while wide > both.shape[1]:
+        wide //= 2
+    around = np.concatenate([both[:, -wide:], both, both[:, :wide]], axis=1)
+    mean = cv2.GaussianBlur(around, (size, size), sigma, borderType=cv2.BORDER_CONSTANT)[:, wide:-wide]
+    made = np.where(strip.usable, tone - mean[..., 0] / np.maximum(mean[..., 1], 1e-6), 0)
+    return np.asarray(made, np.float32)
+
+
+def rotation_of(stand: Stand) -> F64:
+    """(3, 3): the front lens' frame from the back lens' frame."""
+    return np.asarray(stand.turn @ HALF_TURN, np.float64)
+
+
+def stand_of(rotation: F64, lens: Lens) -> Stand:
+    """Where nothing else is known than the rotation, front lens' frame from the back lens'."""
+    return Stand(np.asarray(rotation @ HALF_TURN, np.float64), lens.fov)
