@@ -9,13 +9,15 @@ from __future__ import annotations
 
 import os
 import tempfile
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from studio.bench import capture_floor
 from studio.bench import capture_measure as measure
 from studio.bench.harness import Report
 from studio.bench.phone import Phone, Shots, shoot
@@ -120,16 +122,18 @@ def ladder_of(room: F32, phone: Phone) -> tuple[float, ...]:
 
 @dataclass(frozen=True)
 class Case:
-    """`removal`: of reflections; `wrong`: a listed step is wrong by up to 1 EV."""
+    """`removal`: of reflections; `wrong`: a listed step is wrong by up to 1 EV; `glare`: light is spread."""
 
     removal: bool = True
     wrong: bool = False
+    glare: bool = False
 
 
 CASES = {
     "default": Case(),
     "no-removal": Case(removal=False),
     "wrong-table": Case(wrong=True),
+    "glare": Case(glare=True),
 }
 
 
@@ -168,31 +172,32 @@ def _over_phones(
     found: dict[tuple[str, str], list[float]] = {}
     details: dict[str, list[dict[str, object]]] = {}
     for seed in range(setup.phones):
-        phone = random_phone(100 * index + seed, tuned=False, radius=setup.radius, reflections=True)
-        phone = replace(phone, evs=ladder_of(room, phone))
-        right = shoot(room, phone, seed) if set(wanted) - {"wrong-table"} else None
+        drawn = random_phone(100 * index + seed, tuned=False, radius=setup.radius, reflections=True)
+        drawn = replace(drawn, evs=ladder_of(room, drawn))
+        taken: dict[Phone, Shots] = {}
         for kind in wanted:
             case, wrong = CASES[kind], None
-            shots = right
+            phone = drawn if case.glare else replace(drawn, glare=0.0)
             if case.wrong:
-                lying, side, after = wrong_table(phone, seed)
-                shots, wrong = shoot(room, lying, seed), (side, after)
-            assert shots is not None
+                phone, *wrong = wrong_table(phone, seed)
+            shots = taken[phone] if phone in taken else shoot(room, phone, seed)
+            taken = {phone: shots}
             case_name = f"{name}/{kind}"
             with program.job(f"{case_name} {seed + 1}/{setup.phones}") as job:
                 capture = program.registry.get("capturer", CAPTURER).open(program.services)
                 settings = with_sides(settings_for(case, phone, setup.width), shots)
                 state: CaptureState = capture.run((*shots.front, *shots.back), settings, job)
-            for metric, value in measured(state, shots, room, wrong).items():
-                found.setdefault((case_name, metric), []).append(value)
-            details.setdefault(case_name, []).append(
-                {"phone": seed, "evs": list(phone.evs), "notes": list(state.notes)}
-            )
-    for (case_name, metric), values in found.items():
-        worst = min(values) if metric in ("wrong_named", "compared") else max(values)
-        report.add(case_name, metric, worst, UNITS.get(metric, "1"), (max(values) - min(values)) / 2)
-    for case_name, told in details.items():
-        report.details[case_name] = told
+            values = measured(state, shots, room, wrong)
+            if kind == "default":
+                values |= floor_of(shots, room, setup.width)
+            for metric, figure in values.items():
+                found.setdefault((case_name, metric), []).append(figure)
+            told = {"phone": seed, "evs": list(phone.evs), **values, "notes": list(state.notes)}
+            details.setdefault(case_name, []).append(told)
+    for (case_name, metric), figures in found.items():
+        worst = min(figures) if metric in ("wrong_named", "compared") else max(figures)
+        report.add(case_name, metric, worst, UNITS.get(metric, "1"), (max(figures) - min(figures)) / 2)
+    report.details.update(details)
 
 
 UNITS = {
@@ -206,9 +211,9 @@ UNITS = {
 
 
 def measured(
-    state: CaptureState, shots: Shots, room: F32, wrong: tuple[str, int] | None = None
+    state: CaptureState, shots: Shots, room: F32, wrong: Sequence[Any] | None = None
 ) -> dict[str, float]:
-    """All metrics of a capture by name."""
+    """All metrics of a capture by name. `wrong`: the side, and the shot before which a step is wrong."""
     truth = shots.truth
     assert state.captured is not None
     turned = measure.finished_from_room(state, truth)
@@ -236,6 +241,18 @@ def measured(
     return values
 
 
+def floor_of(shots: Shots, room: F32, width: int) -> dict[str, float]:
+    """The same errors when everything but the room is known: what the lens' pixels and parallax cost."""
+    state = capture_floor.floor(shots, width)
+    assert state.captured is not None
+    turned = measure.finished_from_room(state, shots.truth)
+    made = state.captured.environment.pixels
+    return {
+        "floor_irradiance_rel_rmse": measure.irradiance_error(made, room, turned),
+        "floor_pixel_log2_median": measure.pixel_error(state, room, shots.truth, turned).median,
+    }
+
+
 def captured_light(room: F32, shots: Shots) -> F32:
     """The room as far as its range was captured: brighter light is what fills the darkest exposure."""
     phone, truth = shots.truth.phone, shots.truth
@@ -247,7 +264,7 @@ def captured_light(room: F32, shots: Shots) -> F32:
     in_front = -(equirect_direction(u, v) @ truth.room_from_front)[..., 2] > 0
     ev = np.where(in_front, darkest, darkest + phone.back_ev)[:, :, None]
     full = 1 / (truth.scale * 2.0**ev * np.array(phone.curve.gains))
-    return np.minimum(room, full.astype(np.float32))
+    return np.asarray(np.minimum(room, full), np.float32)
 
 
 def _named(state: CaptureState, side: str, after: int) -> bool:

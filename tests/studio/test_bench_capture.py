@@ -94,6 +94,15 @@ def test_a_perfect_capture_has_no_error() -> None:
     assert (found["nonfinite"], found["fov_error"], found["clipped_energy"]) == (0, 0, 0)
 
 
+def test_a_lens_picture_with_its_true_geometry_is_the_room() -> None:
+    shots = shoot(room(), replace(PHONE, size=(160, 128), circle=Circle(80, 63, 58), falloff=0.4), 1)
+    found = capture.floor_of(shots, room(), 128)
+    assert found["floor_irradiance_rel_rmse"] < 2e-3
+    assert found["floor_pixel_log2_median"] < 5e-3
+    bent = replace(shots.truth, rotation=shots.truth.rotation @ turn(20, 0, 0))
+    assert capture.floor_of(replace(shots, truth=bent), room(), 128)["floor_irradiance_rel_rmse"] > 0.01
+
+
 def test_errors_are_as_large_as_they_were_made() -> None:
     shots = shoot(room(), PHONE, 1)
     state = perfect(shots, room())
@@ -211,7 +220,7 @@ def test_rows_of_every_case(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
     assert main(arguments) == 0
     found = {(row["case"], row["metric"]): row["value"] for row in json.loads(rows.read_text())["rows"]}
     cases = {case for case, _ in found}
-    assert cases == {"sunset/default", "sunset/no-removal", "sunset/wrong-table", "clone"}
+    assert cases == {"sunset/default", "sunset/no-removal", "sunset/wrong-table", "sunset/glare", "clone"}
     named = (
         "irradiance_rel_rmse",
         "pixel_log2_median",
@@ -224,7 +233,7 @@ def test_rows_of_every_case(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
     assert found["sunset/default", "irradiance_rel_rmse"] < 0.01
     assert found["sunset/wrong-table", "wrong_named"] == 0  # nothing was named
     assert found["clone", "rel_error"] < 1e-6
-    assert [s.reflections.automatic for s in photographer.asked] == [True, False, True]
+    assert [s.reflections.automatic for s in photographer.asked] == [True, False, True, True]
     assert all(len(s.bracket.shots) == 6 for s in photographer.asked)
 
 
