@@ -24,6 +24,7 @@ four rooms, neighbours of 2 EV had 0.69 and more, views apart 0.73 and less, and
 _PAUSE, _REPEATED, _LOOKS_REPEATED, _PARTED, _ALONE = 0.25, 0.3, 0.2, 0.05, 0.25
 _TURNING = 2.0  # seconds that it takes at least
 _OTHER = 0.5  # upper bound below which a photograph shows something else
+_AGREED = 0.5  # for parts in which all photographs are that a person has put together
 _FORBIDDEN = -100.0
 
 
@@ -113,30 +114,25 @@ def _best(known: Sequence[Member], low: npt.NDArray[np.float64], may_be_one: boo
 
 
 def _labelled(known: Sequence[Member], way: list[bool]) -> list[bool]:
-    """The same parts, named as a person did, else the first one front."""
+    """The first part is the front unless a person named most otherwise; who was put somewhere is there."""
     turned = [not b for b in way]
-    wrong = sum(m.side is not None and (m.side == BACK) != b for m, b in zip(known, way, strict=True))
-    right = sum(m.side is not None and (m.side == BACK) == b for m, b in zip(known, way, strict=True))
-    if wrong != right:
-        chosen = turned if wrong > right else way
-    else:
-        chosen = turned if way and way[0] and not all(way) else way
+    told = [(m.side == BACK) == b for m, b in zip(known, way, strict=True) if m.side is not None]
+    chosen = turned if way and way[0] and not all(way) else way
+    if 2 * len(told) >= len(known) and 2 * sum(told) != len(told):  # not only single ones that were moved
+        chosen = way if 2 * sum(told) > len(told) else turned
     return [m.side == BACK if m.side else b for m, b in zip(known, chosen, strict=True)]
 
 
 def _points(known: Sequence[Member], low: npt.NDArray[np.float64], way: list[bool]) -> float:
     back = np.array(way)
-    told = [(m.side == BACK, b) for m, b in zip(known, way, strict=True) if m.side is not None]
-    if len({side for side, _ in told}) == 2 and len({side == b for side, b in told}) == 2:
-        return _FORBIDDEN
-    if len({side for side, _ in told}) == 1 and len({b for _, b in told}) == 2:
-        return _FORBIDDEN
+    told = [(m.side == BACK) == b for m, b in zip(known, way, strict=True) if m.side is not None]
+    agreed = _AGREED * max(sum(told), len(told) - sum(told)) / max(len(told), 1)
     if not back.any() or back.all():
-        if len({side for side, _ in told}) == 2:
+        if {m.side for m in known} >= {FRONT, BACK}:
             return _FORBIDDEN
         weakest = _weakest(low)
-        return _PARTED if np.isnan(weakest) else weakest - _SAME_VIEW
-    total = 0.0
+        return agreed + (_PARTED if np.isnan(weakest) else weakest - _SAME_VIEW)
+    total = agreed
     across = low[np.ix_(~back, back)]
     if np.isfinite(across).any():
         total += _SAME_VIEW - float(np.nanmax(across))
