@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import hashlib
+from dataclasses import replace
 from datetime import datetime, timedelta
 from pathlib import Path
 
@@ -9,6 +11,7 @@ import numpy as np
 
 from studio.bench.phone import Shots
 from studio_core.imaging.photograph import Photograph, ShotFacts
+from studio_core.imaging.projection import Circle
 
 START = datetime(2024, 5, 4, 12, 30, 0)
 _EXIF, _GPS = 0x8769, 0x8825
@@ -42,6 +45,36 @@ def write_photograph(
 
     facts = exif_of(shot.facts, position) if exif else Image.Exif()
     Image.fromarray(shot.pixels).save(path, quality=quality, subsampling=0, exif=facts.tobytes())
+
+
+def as_dual(shots: Shots, turns: tuple[int, int] = (0, 0)) -> tuple[tuple[Photograph, ...], Circle, Circle]:
+    """The same as of a camera with two lenses: both circles in one picture, front left, a shot an exposure.
+
+    `turns`: each half is turned by so many right angles, counter-clockwise. Both circles as they then lie.
+    """
+    made, circles = [], []
+    for front, back in zip(shots.front, shots.back, strict=True):
+        halves = [np.rot90(one.pixels, k) for one, k in zip((front, back), turns, strict=True)]
+        height = max(half.shape[0] for half in halves)
+        full = [np.pad(half, ((0, height - half.shape[0]), (0, 0), (0, 0))) for half in halves]
+        pixels = np.ascontiguousarray(np.concatenate(full, axis=1))
+        digest = hashlib.sha256(pixels.tobytes()).hexdigest()
+        facts = replace(front.facts, name=front.facts.name.replace("front", "dual"))
+        made.append(Photograph(pixels, facts, digest))
+    right = 0
+    for side, half, k in zip((shots.truth.front, shots.truth.back), halves, turns, strict=True):
+        circle = _turned(side.circle, side.light.shape[:2], k)
+        circles.append(replace(circle, x=circle.x + right))
+        right += half.shape[1]
+    return tuple(made), circles[0], circles[1]
+
+
+def _turned(circle: Circle, shape: tuple[int, ...], turns: int) -> Circle:
+    height, width = shape[:2]
+    for _ in range(turns % 4):
+        circle = replace(circle, x=circle.y, y=width - circle.x)
+        height, width = width, height
+    return circle
 
 
 def exif_of(facts: ShotFacts, position: bool = False):  # type: ignore[no-untyped-def]  # PIL's Exif

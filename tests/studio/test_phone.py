@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from studio.bench.phone import Arc, Phone, Shots, lens_light, shoot
-from studio.bench.phone_files import write_shots
+from studio.bench.phone_files import as_dual, write_shots
 from studio.bench.phone_random import OTHER, TUNED, random_phone
 from studio.bench.phone_response import FAMILIES, Curve
 from studio_core.capturing.settings import BACK, FRONT
@@ -191,6 +191,23 @@ def test_files_hold_exif_and_the_pixels(tmp_path: Path) -> None:
 
     read = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
     np.testing.assert_array_equal(read[:, :, ::-1], sixteen.front[0].pixels)
+
+
+@pytest.mark.parametrize("turns", [(0, 0), (1, 3), (2, 1)])
+def test_two_circles_in_one_picture_lie_where_it_is_told(turns: tuple[int, int]) -> None:
+    phone = replace(SMALL, back_shift=(5, 3), back_scale=0.9)
+    shots = shoot(np.ones((16, 32, 3), np.float32), phone)
+    dual, front, back = as_dual(shots, turns)
+    assert len(dual) == 3
+    pixels = dual[-1].pixels
+    y, x = np.mgrid[0 : pixels.shape[0], 0 : pixels.shape[1]] + 0.5
+    inside = np.zeros(pixels.shape[:2], bool)
+    for circle in (front, back):
+        reach = np.hypot(x - circle.x, y - circle.y)
+        assert pixels[reach < circle.radius - 2].min() > 100
+        inside |= reach < circle.radius + 1
+    assert pixels[~inside].max() < 40
+    assert front.x < back.x
 
 
 def test_lens_models_may_be_any() -> None:
