@@ -12,7 +12,7 @@ import tempfile
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -20,21 +20,27 @@ import numpy.typing as npt
 from studio.bench import capture_floor
 from studio.bench import capture_measure as measure
 from studio.bench.harness import Report
-from studio.bench.phone import Phone, Shots, shoot
+from studio.bench.phone import Phone, Shots, clipped_share, shoot
 from studio.bench.phone_random import random_phone
 from studio.headless import Headless
 from studio_core.capturing.artifacts import CaptureState
 from studio_core.capturing.settings import (
     BACK,
     FRONT,
+    LUX,
     SIDES,
     BracketSettings,
+    CalibrationSettings,
     CaptureSettings,
     LensSettings,
     ReflectionSettings,
     Shot,
     StitchSettings,
 )
+from studio_core.imaging.latlong import equirect_direction, pixel_solid_angles
+
+if TYPE_CHECKING:
+    from studio_core.shading.job import Job
 
 F32 = npt.NDArray[np.float32]
 IN_PARTS = True
@@ -110,23 +116,26 @@ def read_map(path: Path) -> F32:
 
 def ladder_of(room: F32, phone: Phone) -> tuple[float, ...]:
     """The first ladder whose darkest exposure clips less than `COVERED` of the energy, or the last."""
-    from studio.bench.phone import clipped_share
+    fitting = (evs for evs in LADDERS if covered(room, replace(phone, evs=evs)))
+    return next(fitting, LADDERS[-1])
 
+
+def covered(room: F32, phone: Phone) -> bool:
+    """Whether the phone's exposures resolve nearly all of the room's energy."""
     middle = float(np.median(room.mean(axis=2)))
-    for evs in LADDERS:
-        darkest = min(evs) + min(0.0, phone.back_ev)
-        if clipped_share(room, phone.key / middle * 2.0**darkest) < COVERED:
-            return evs
-    return LADDERS[-1]
+    darkest = min(phone.evs) + min(0.0, phone.back_ev)
+    return clipped_share(room, phone.key / middle * 2.0**darkest) < COVERED
 
 
 @dataclass(frozen=True)
 class Case:
-    """`removal`: of reflections; `wrong`: a listed step is wrong by up to 1 EV; `glare`: light is spread."""
+    """`removal`: of reflections; `wrong`: a listed step is wrong by up to 1 EV; `glare`: light is spread;
+    `meter`: two readings of a light meter tell how bright clipped lamps are."""
 
     removal: bool = True
     wrong: bool = False
     glare: bool = False
+    meter: bool = False
 
 
 CASES = {
@@ -134,6 +143,7 @@ CASES = {
     "no-removal": Case(removal=False),
     "wrong-table": Case(wrong=True),
     "glare": Case(glare=True),
+    "lamps": Case(meter=True),
 }
 
 
@@ -174,19 +184,19 @@ def _over_phones(
     for seed in range(setup.phones):
         drawn = random_phone(100 * index + seed, tuned=False, radius=setup.radius, reflections=True)
         drawn = replace(drawn, evs=ladder_of(room, drawn))
-        taken: dict[Phone, Shots] = {}
+        shots: Shots | None = None
         for kind in wanted:
             case, wrong = CASES[kind], None
             phone = drawn if case.glare else replace(drawn, glare=0.0)
+            if case.meter and covered(room, phone):
+                continue
             if case.wrong:
                 phone, *wrong = wrong_table(phone, seed)
-            shots = taken[phone] if phone in taken else shoot(room, phone, seed)
-            taken = {phone: shots}
+            if shots is None or shots.truth.phone != phone:
+                shots = shoot(room, phone, seed)
             case_name = f"{name}/{kind}"
             with program.job(f"{case_name} {seed + 1}/{setup.phones}") as job:
-                capture = program.registry.get("capturer", CAPTURER).open(program.services)
-                settings = with_sides(settings_for(case, phone, setup.width), shots)
-                state: CaptureState = capture.run((*shots.front, *shots.back), settings, job)
+                state = _captured(program, case, shots, room, setup.width, job)
             values = measured(state, shots, room, wrong)
             if kind == "default":
                 values |= floor_of(shots, room, setup.width)
@@ -198,6 +208,36 @@ def _over_phones(
         worst = min(figures) if metric in ("wrong_named", "compared") else max(figures)
         report.add(case_name, metric, worst, UNITS.get(metric, "1"), (max(figures) - min(figures)) / 2)
     report.details.update(details)
+
+
+def _captured(program: Headless, case: Case, shots: Shots, room: F32, width: int, job: Job) -> CaptureState:
+    capture = program.registry.get("capturer", CAPTURER).open(program.services)
+    photographs = (*shots.front, *shots.back)
+    settings = with_sides(settings_for(case, shots.truth.phone, width), shots)
+    state: CaptureState = capture.run(photographs, settings, job)
+    if case.meter:
+        calibration = with_meter(room, shots, measure.finished_from_room(state, shots.truth))
+        state = capture.run(photographs, replace(settings, calibration=calibration), job)
+    return state
+
+
+def with_meter(
+    room: F32, shots: Shots, finished_from_room: npt.NDArray[np.float64], lux: float = 1000.0
+) -> CalibrationSettings:
+    """Two readings of a meter that faces what no exposure resolves: with that shaded, and `lux` with it."""
+    resolved = captured_light(room, shots)
+    clipped = np.any(room > resolved, axis=2)
+    height, width = clipped.shape
+    u, v = np.meshgrid((np.arange(width) + 0.5) / width, (np.arange(height) + 0.5) / height)
+    lost = (room - resolved).sum(axis=2) * pixel_solid_angles(height, width)[:, None]
+    facing = (equirect_direction(u, v) * lost[:, :, None]).sum(axis=(0, 1))
+    facing /= np.linalg.norm(facing)
+    shaded = np.where(clipped[:, :, None], np.float32(0), room)
+    read = [measure.irradiance(light, facing[None])[0] @ measure.LUMINANCE for light in (shaded, room)]
+    x, y, z = (float(a) for a in finished_from_room @ facing)
+    return CalibrationSettings(
+        scale=LUX, lux=lux * read[0] / read[1], facing=(x, y, z), sun=True, sun_lux=lux
+    )
 
 
 UNITS = {
@@ -258,8 +298,6 @@ def captured_light(room: F32, shots: Shots) -> F32:
     phone, truth = shots.truth.phone, shots.truth
     darkest = min(phone.evs)
     height, width = room.shape[:2]
-    from studio_core.imaging.latlong import equirect_direction
-
     u, v = np.meshgrid((np.arange(width) + 0.5) / width, (np.arange(height) + 0.5) / height)
     in_front = -(equirect_direction(u, v) @ truth.room_from_front)[..., 2] > 0
     ev = np.where(in_front, darkest, darkest + phone.back_ev)[:, :, None]

@@ -13,9 +13,11 @@ from studio.bench.phone_optics import look_up
 from studio.bench.phone_response import Curve
 from studio_core.capturing.artifacts import CaptureState, Response
 from studio_core.capturing.settings import SIDES
+from studio_core.colour import LUMINANCE as WEIGHTS
 from studio_core.imaging.latlong import equirect_direction, pixel_solid_angles
 
 F32 = npt.NDArray[np.float32]
+LUMINANCE = np.array(WEIGHTS)
 F64 = npt.NDArray[np.float64]
 SEAM = 8.0
 """Degrees from where both lenses see the same, on either side, that `pixel_log2_median` leaves out."""
@@ -110,7 +112,7 @@ def _quantile(values: F64, weights: F64, q: float) -> float:
 
 
 def _luminance(colour: npt.NDArray[np.floating]) -> F64:
-    return np.asarray(colour @ np.array([0.2126, 0.7152, 0.0722]), np.float64)
+    return np.asarray(colour @ LUMINANCE, np.float64)
 
 
 def angle_between(a: F64, b: F64) -> float:

@@ -156,6 +156,21 @@ def test_light_beyond_the_darkest_exposure_is_not_asked_for() -> None:
     assert capture.ladder_of(room(), PHONE) == capture.LADDERS[0]
 
 
+def test_a_meter_reads_the_room_without_and_with_what_is_clipped() -> None:
+    bright = room()
+    bright[20:22, 60:62] = 5000
+    shots = shoot(bright, PHONE, 1)
+    turned = turn(30, 0, 0)
+    told = capture.with_meter(bright, shots, turned)
+    u, v = 61 / 128, 21 / 64
+    np.testing.assert_allclose(told.facing, turned @ equirect_direction(u, v), atol=0.01)
+    assert told.sun_lux == 1000
+    dark = capture_measure.irradiance(room(), np.array([turned.T @ told.facing]))[0]
+    with_lamp = capture_measure.irradiance(bright, np.array([turned.T @ told.facing]))[0]
+    weights = capture_measure.LUMINANCE
+    assert told.lux == pytest.approx(1000 * (dark @ weights) / (with_lamp @ weights), rel=0.02)
+
+
 def test_one_step_of_a_wrong_table_is_wrong() -> None:
     for seed in range(8):
         phone = random_phone(seed, tuned=False)
