@@ -15,7 +15,7 @@ from studio_core.errors import InputError, LucarneError
 
 VERBS = (
     *("demo", "new", "info", "copy", "compact", "render", "frames", "radiance", "precompute", "export"),
-    *("script", "bench", "stress", "doctor"),
+    *("capture", "script", "bench", "stress", "doctor"),
 )
 BAD_INPUT, OUR_FAULT, INTERRUPTED, NOBODY_READS = 2, 70, 130, 141
 TRACEBACK = "LUCARNE_TRACEBACK"
@@ -139,6 +139,10 @@ def _run(options: argparse.Namespace) -> int:
                 from studio.verbs_precompute import precompute
 
                 return precompute(options, program) or 0
+            if options.verb == "capture":
+                from studio.verbs_capture import capture
+
+                return capture(options, program) or 0
             return getattr(verbs, options.verb)(options, program) or 0
     finally:
         program.close()
@@ -277,6 +281,10 @@ def parser() -> argparse.ArgumentParser:
     export = verb("export", "write a project as GLB, or as a Mitsuba 3 scene folder")
     export.add_argument("project", type=Path, metavar="PROJECT")
     export.add_argument("-o", "--out", type=Path, required=True, metavar="(OUT.glb|DIR)")
+
+    from studio.capture_options import add_options
+
+    add_options(verb("capture", "a room's light from photographs of it, taken at several exposures"))
 
     script = verb("script", "run a Python file with the names of the console", json=False)
     text = "what the script's names mean; saved where it says save()"

@@ -25,7 +25,7 @@ def script(options: argparse.Namespace, program: Headless) -> int:
     file: Path = options.file
     if not file.is_file():
         raise InputError(f"{file}: there is no such file")
-    document, project = _opened(options.project)
+    document, project = open_project(options.project)
     session = _session(document)
     main = types.ModuleType("__main__")
     main.__file__ = str(file)
@@ -58,7 +58,7 @@ def script(options: argparse.Namespace, program: Headless) -> int:
     return 0
 
 
-def _opened(path: Path | None) -> tuple[Document, LoadedProject | None]:
+def open_project(path: Path | None) -> tuple[Document, LoadedProject | None]:
     """The project with its undo history, as the window opens it; an empty document without one."""
     from studio_core.project.store import load
 

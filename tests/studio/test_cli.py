@@ -416,7 +416,7 @@ def test_no_verb_without_a_window_loads_qt(files: Path) -> None:
         ["precompute", "made.lucarne", *QUICK],
         ["doctor"],
     ]
-    assert {command[0] for command in commands} | {"bench", "stress"} == set(VERBS)
+    assert {command[0] for command in commands} | {"bench", "stress", "capture"} == set(VERBS)
     source = f"""
 import sys
 from studio.cli import main
