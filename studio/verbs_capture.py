@@ -249,7 +249,6 @@ def _write_report(path: Path, report: Mapping[str, Any]) -> None:
 
 def _save(path: Path, state: CaptureState, settings: CaptureSettings, given: Sequence[Given]) -> None:
     """The capture and its environment as one step of a project's history."""
-
     from studio.verbs_script import open_project
     from studio_core.capturing import edits, keeping
     from studio_core.project.lock import acquire
