@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from studio_core.capturing.artifacts import CaptureState
     from studio_core.capturing.settings import CaptureSettings, Shot
     from studio_core.imaging.photograph import Photograph
+    from studio_core.scene.capture import KeptPhotograph
     from studio_core.shading.job import Job
 
 CAPTURER = "fisheye"
@@ -41,7 +42,8 @@ def capture(options: argparse.Namespace, program: Headless) -> None:
     given, layout = _given(options)
     settings = _settings(options)
     with program.job("Capturing") as job:
-        photographs, shots, notes = _read(given, job)
+        taken, shots, notes = _read(given, job)
+        photographs = [photograph for photograph, _ in taken]
         settings = _with_shots(settings, shots, layout)
         run = program.registry.get("capturer", CAPTURER).open(program.services)
         state: CaptureState = run.run(photographs, settings, job)
@@ -50,7 +52,7 @@ def capture(options: argparse.Namespace, program: Headless) -> None:
     notes = list(dict.fromkeys([*notes, *state.notes, *state.captured.notes]))
     for note in notes:
         program.say(note)
-    _write(options, program, state, settings, given, notes)
+    _write(options, program, state, settings, [kept for _, kept in taken], notes)
     _tell(options, program, state, notes, len(photographs))
 
 
@@ -155,24 +157,26 @@ def _settings(options: argparse.Namespace) -> CaptureSettings:
         raise InputError(f"--set: {error}") from None
 
 
-def _read(given: Sequence[Given], job: Job) -> tuple[list[Photograph], list[Shot], list[str]]:
+def _read(
+    given: Sequence[Given], job: Job
+) -> tuple[list[tuple[Photograph, KeptPhotograph]], list[Shot], list[str]]:
     """The photographs that can be read, what is said of each, and a sentence for each other one.
 
     A file that is named twice counts once; InputError where it is said to be both views, or when no file
     can be read.
     """
+    from studio_core.capturing.keeping import take
     from studio_core.capturing.settings import Shot
     from studio_core.imaging.io import ImageDecoder
-    from studio_core.imaging.photograph_read import read_photograph
 
-    photographs: list[Photograph] = []
+    taken: list[tuple[Photograph, KeptPhotograph]] = []
     shots: dict[str, Shot] = {}
     notes: list[str] = []
     with ImageDecoder() as decoder:
         for done, one in enumerate(given):
             job.checkpoint(done, 20 * len(given))  # reading is a small part of the work
             try:
-                photograph = read_photograph(one.path, decoder=decoder)
+                photograph, kept = take(one.path, decoder)
             except InputError as error:
                 if len(given) == 1:
                     raise
@@ -185,10 +189,12 @@ def _read(given: Sequence[Given], job: Job) -> tuple[list[Photograph], list[Shot
                 notes.append(f"{one.path} was given twice.")
                 continue
             shots[photograph.digest] = Shot(photograph.digest, one.side, one.ev)
-            photographs.append(photograph)
-    if not photographs:
+            if kept.data is not None:  # the project holds it: where it was is nobody's business
+                kept = dataclasses.replace(kept, path="")
+            taken.append((photograph, kept))
+    if not taken:
         raise InputError(notes[0] if len(notes) == 1 else f"no photograph can be used; {notes[0]}")
-    return photographs, list(shots.values()), notes
+    return taken, list(shots.values()), notes
 
 
 def _with_shots(settings: CaptureSettings, shots: Sequence[Shot], layout: str) -> CaptureSettings:
@@ -214,7 +220,7 @@ def _write(
     program: Headless,
     state: CaptureState,
     settings: CaptureSettings,
-    given: Sequence[Given],
+    kept: Sequence[KeptPhotograph],
     notes: Sequence[str],
 ) -> None:
     from studio_core.imaging.environment_out import write_cube, write_environment
@@ -229,7 +235,7 @@ def _write(
         write_cube(options.cubemap, captured.faces, options.cube_layout, luminance_scale=scale)
     if options.project is not None:
         with program.job("Saving"):
-            _save(options.project, state, settings, given)
+            _save(options.project, state, settings, kept)
     if options.report is not None:
         _write_report(options.report, {**captured.report, "notes": list(notes)})
 
@@ -247,10 +253,10 @@ def _write_report(path: Path, report: Mapping[str, Any]) -> None:
         beside.unlink(missing_ok=True)
 
 
-def _save(path: Path, state: CaptureState, settings: CaptureSettings, given: Sequence[Given]) -> None:
+def _save(path: Path, state: CaptureState, settings: CaptureSettings, kept: Sequence[KeptPhotograph]) -> None:
     """The capture and its environment as one step of a project's history."""
     from studio.verbs_script import open_project
-    from studio_core.capturing import edits, keeping
+    from studio_core.capturing import edits
     from studio_core.project.lock import acquire
     from studio_core.project.records import History
     from studio_core.project.store import save
@@ -259,12 +265,7 @@ def _save(path: Path, state: CaptureState, settings: CaptureSettings, given: Seq
     there = _holds_something(path)
     with acquire(path) if there else nullcontext():
         document, project = open_project(path if there else None)
-        used = state.brackets
-        names = {shot.digest for side in used.sides.values() for shot in side.shots} if used else set()
-        kept = tuple(
-            one for one in (keeping.keep(g.path) for g in given if g.path.is_file()) if one.digest in names
-        )
-        add = edits.add_capture(kept, settings)
+        add = edits.add_capture(tuple(kept), settings)
         with document.grouped("Capture the room's light"):
             document.apply(add)
             document.apply(edits.use_capture(document.scene, add.nodes[0].id, state.captured))

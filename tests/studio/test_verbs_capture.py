@@ -11,12 +11,15 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scenes import little_scene
 
 from studio.bench.phone import Phone, shoot
 from studio.bench.phone_files import write_shots
 from studio.cli import BAD_INPUT, main
 from studio.headless import Headless
+from studio.verbs_script import open_project
 from studio_core.capturing.artifacts import Calibration, Captured, CaptureState
+from studio_core.capturing.keeping import recall
 from studio_core.capturing.settings import (
     AUTOMATIC,
     DUAL,
@@ -29,7 +32,11 @@ from studio_core.errors import InputError
 from studio_core.imaging.environment import load_environment
 from studio_core.imaging.photograph import Photograph
 from studio_core.imaging.projection import Circle
+from studio_core.project.lock import acquire
+from studio_core.project.store import load, save
+from studio_core.scene.capture import Capture
 from studio_core.scene.geometry import Image
+from studio_core.scene.nodes import Environment
 
 
 class Photographer:
@@ -164,6 +171,53 @@ def test_what_cannot_be_read_is_a_warning(
     assert len(photographer.asked[0][0]) == 3
     assert "twice" in notes[0]
     assert "broken.jpg" in notes[1]
+
+
+def test_a_project_gets_the_capture_and_its_light_as_one_step(
+    photographer: Photographer, tmp_path: Path
+) -> None:
+    phone = Phone(size=(60, 48), circle=Circle(30, 24, 21), samples=1)
+    room = np.ones((16, 32, 3), np.float32)
+    front, _ = write_shots(shoot(room, phone), tmp_path, position=True)
+    project = tmp_path / "flat.lucarne"
+    given = ["capture", "--front", *map(str, front), "--set", "lens.fov=200", "--project", str(project)]
+    assert main([*given, "--quiet"]) == 0
+    loaded = load(project)
+    (capture,), (light,) = loaded.scene.of(Capture), loaded.scene.of(Environment)
+    assert light.image.pixels.shape == (16, 32, 3)
+    assert light.luminance_scale == 120.0
+    assert capture.environment == light.id
+    assert capture.settings.lens.fov == 200.0
+    assert [shot.side for shot in capture.settings.bracket.shots] == ["front"] * 3
+    assert json.loads(capture.report) == {"spread": 0.2}
+    for kept, shot in zip(capture.photographs, photographer.asked[0][0], strict=True):
+        assert kept.path == ""
+        again = recall(kept)
+        np.testing.assert_array_equal(again.pixels, shot.pixels)
+        assert again.digest == shot.digest
+    assert b"GPS" not in b"".join(kept.data.pixels.tobytes() for kept in capture.photographs if kept.data)
+    save(tmp_path / "room.lucarne", little_scene())
+    before = load(tmp_path / "room.lucarne").scene
+    assert main([*given[:-1], str(tmp_path / "room.lucarne"), "--quiet"]) == 0
+    document, _ = open_project(tmp_path / "room.lucarne")
+    assert len(list(document.scene.of(Capture))) == 1
+    assert len(list(document.scene.of(Environment))) == 1
+    assert document.history[document.position].label == "Capture the room's light"
+    document.undo()
+    assert sorted(document.scene.nodes) == sorted(before.nodes)
+    assert not list(document.scene.of(Capture))
+
+
+def test_a_project_that_is_open_is_left_alone(
+    photographer: Photographer, files: Files, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    project = tmp_path / "room.lucarne"
+    save(project, little_scene())
+    before = project.read_bytes()
+    with acquire(project):
+        _refused(capsys, [*files[0], "--project", str(project)], "room.lucarne")
+    assert photographer.asked == []
+    assert project.read_bytes() == before
 
 
 def _refused(capsys: pytest.CaptureFixture[str], arguments: list[str], *words: str) -> None:
