@@ -164,6 +164,8 @@ class CalibrationSettings:
     sun_lux: float = param(
         10000.0, "Measured with it", "What the meter said, lamp or sun included", unit="lx", low=0.0, high=2e5
     )
+    sun_facing: tuple[float, float, float] | None = None
+    """Where the meter faced then. None: as before, and the first reading was of the room without the lamp."""
 
 
 @dataclass(frozen=True)

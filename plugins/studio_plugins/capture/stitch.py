@@ -1,0 +1,263 @@
+"""From lenses to one equirectangular picture: each direction from the lens that sees it, without a seam."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from studio_core.capturing.artifacts import F32, F64, Mask, Registration, Stitched, View
+from studio_core.capturing.settings import BACK, FRONT, StitchSettings
+from studio_core.imaging.latlong import direction_to_uv, equirect_direction
+from studio_core.imaging.sphere import with_border
+from studio_core.parallel import Workers
+from studio_core.shading.job import Job
+from studio_plugins.capture.fill import fill
+from studio_plugins.capture.level import find_level
+from studio_plugins.capture.sampling import COARSE, Seen, Source, harshness, lens_source, look_through
+from studio_plugins.capture.seam import Joint, join
+
+HALF_TURN = np.diag([-1.0, 1.0, -1.0])
+"""The finished picture's frame from the front lens' frame when nothing is levelled or turned."""
+_TILE = (128, 256)
+_BORDER = 4
+_LEVEL_WIDTH = 2048
+
+
+def stitch(
+    views: Mapping[str, View],
+    registration: Registration | None,
+    settings: StitchSettings,
+    job: Job,
+    workers: Workers | None = None,
+) -> Stitched:
+    """The finished picture's light from one lens or two, before calibration.
+
+    `views`: by side; with both there must be a `registration`, whose lens, falloff and gain count (a
+    registration of a single lens counts for its lens and falloff). What no lens sees is filled with the
+    light of its surroundings and marked. Raises ValueError without views, Cancelled.
+    """
+    if not views:
+        raise ValueError("there is nothing to join")
+    lenses = _lenses(views, registration, 2 * np.pi / settings.width)
+    base, levelled, notes = HALF_TURN, None, list[str]()
+    if settings.level:
+        width = min(settings.width, _LEVEL_WIDTH)
+        draft = _compose(lenses, StitchSettings(width=width, blend="feather"), HALF_TURN, job, workers)
+        found = find_level(draft.light, ~draft.unseen)
+        if found.rotation is not None:
+            base, levelled = found.rotation @ HALF_TURN, found.tilt
+        notes.append(found.told)
+    upright = turned(settings) @ base
+    made = _compose(lenses, settings, upright, job, workers)
+    fill(made.light, made.unseen)
+    return Stitched(
+        made.light, made.clipped, made.unseen, made.share, upright, made.dark, levelled, tuple(notes)
+    )
+
+
+def turned(settings: StitchSettings) -> F64:
+    """(3, 3) what the designer turns, after levelling.
+
+    `roll` turns the picture clockwise, `pitch` moves its middle up, `north` then moves it to the right.
+    """
+    p, r, n = (math.radians(a) for a in (settings.pitch, settings.roll, settings.north))
+    about_x = np.array([[1, 0, 0], [0, math.cos(p), math.sin(p)], [0, -math.sin(p), math.cos(p)]])
+    about_y = np.array([[math.cos(n), 0, -math.sin(n)], [0, 1, 0], [math.sin(n), 0, math.cos(n)]])
+    about_z = np.array([[math.cos(r), -math.sin(r), 0], [math.sin(r), math.cos(r), 0], [0, 0, 1]])
+    return np.asarray(about_y @ about_x @ about_z, np.float64)
+
+
+def stitch_equirectangular(
+    view: View, settings: StitchSettings, job: Job, workers: Workers | None = None
+) -> Stitched:
+    """The same for a picture that is equirectangular already: levelled, turned and resized.
+
+    Unchanged, bit for bit, where nothing has to be done. Pixels that are not usable are filled. `view`'s
+    circle and lens do not matter. ValueError when it is not twice as wide as high.
+    """
+    height, width = view.light.shape[:2]
+    if width != 2 * height:
+        raise ValueError("an equirectangular picture is twice as wide as high")
+    base, levelled, notes = np.eye(3), None, list[str]()
+    if settings.level:
+        found = find_level(np.where(view.usable[..., None], view.light, np.float32(0)), view.usable)
+        if found.rotation is not None:
+            base, levelled = found.rotation, found.tilt
+        notes.append(found.told)
+    upright = turned(settings) @ base
+    if settings.width == width and np.array_equal(upright, np.eye(3)):
+        none = np.zeros((height, width), np.bool_)
+        light, unseen = view.light.copy(), ~view.usable
+        clipped = none if view.clipped is None else view.clipped
+        made = _Composed(light, clipped, none if view.dark is None else view.dark, unseen, _ones(unseen))
+    else:
+        source = _picture_source(view, 2 * np.pi / settings.width)
+        made = _compose([_Lens(source, np.eye(3), None, np.ones(3))], settings, upright, job, workers)
+    fill(made.light, made.unseen)
+    return Stitched(
+        made.light, made.clipped, made.unseen, made.share, upright, made.dark, levelled, tuple(notes)
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Lens:
+    """A source, its frame from the front lens' frame, and what its light is multiplied by."""
+
+    source: Source
+    frame: F64
+    falloff: Callable[[F64], F32] | None
+    gain: F64
+
+    def look(self, directions: F64) -> Seen:
+        """Directions (h, w, 3) of the front lens' frame."""
+        own = directions @ self.frame.T
+        seen = look_through(self.source, own)
+        if seen.seen.any():
+            light = seen.light
+            light *= self.gain.astype(np.float32)
+            if self.falloff is not None:
+                light /= self.falloff(-own[..., 2])[..., None]
+        return seen
+
+
+@dataclass(frozen=True, eq=False)
+class _Composed:
+    light: F32
+    clipped: Mask
+    dark: Mask
+    unseen: Mask
+    share: F32
+
+
+def _lenses(views: Mapping[str, View], registration: Registration | None, pitch: float) -> list[_Lens]:
+    if len(views) == 2 and registration is None:
+        raise ValueError("how the two lenses stand to each other is not known")
+    made = []
+    for side in (FRONT, BACK):
+        if side not in views:
+            continue
+        view = views[side]
+        frame, gain, falloff = np.eye(3), np.ones(3), None
+        if registration is not None:
+            lens = registration.lens
+            view = View(view.light, view.usable, view.circle, lens, view.clipped, view.dark)
+            if any(registration.falloff):
+                falloff = _falloff(registration.falloff, lens.half)
+            if side == BACK and FRONT in views:
+                frame, gain = registration.rotation.T, registration.gain
+        made.append(_Lens(lens_source(view, pitch), frame, falloff, gain))
+    return made
+
+
+def _falloff(coefficients: tuple[float, float, float], half: float) -> Callable[[F64], F32]:
+    a, b, c = coefficients
+
+    def of(cosine: F64) -> F32:
+        s = np.arccos(np.clip(cosine, -1, 1)) / half
+        q = np.minimum(s * s, 1.21)
+        return np.maximum(1 + q * (a + q * (b + q * c)), 0.05).astype(np.float32)
+
+    return of
+
+
+def _picture_source(view: View, pitch: float) -> Source:
+    """An equirectangular picture, with a border so that nothing ends at its edges."""
+    height, width = view.light.shape[:2]
+    light = with_border(np.where(view.usable[..., None], view.light, np.float32(0)), _BORDER)
+
+    def at(directions: F64) -> tuple[F64, Mask]:
+        u, v = direction_to_uv(directions)
+        points = np.stack([u * width + _BORDER, v * height + _BORDER], axis=-1)
+        return points, np.ones(u.shape, np.bool_)
+
+    def mask(given: Mask | None) -> np.ndarray | None:
+        return (
+            None if given is None or not given.any() else with_border(given.astype(np.uint8) * 255, _BORDER)
+        )
+
+    good = with_border(view.usable.astype(np.uint8) * 255, _BORDER)
+    coarse = pitch * width / (2 * np.pi) > COARSE
+    return Source(light, good, mask(view.clipped), mask(view.dark), harshness(light), coarse, at, width)
+
+
+def _compose(
+    lenses: list[_Lens], settings: StitchSettings, upright: F64, job: Job, workers: Workers | None
+) -> _Composed:
+    """All tiles of the picture; what no lens sees is 0."""
+    width = settings.width - settings.width % 2
+    height = width // 2
+    joint = None
+    if len(lenses) == 2:
+        one, other = lenses
+        joint = join(_looking(one), _looking(other), width, settings.blend, math.radians(settings.feather))
+    size = height, width
+    light, share = np.empty((*size, 3), np.float32), np.empty(size, np.float32)
+    clipped, dark, unseen = np.empty(size, np.bool_), np.empty(size, np.bool_), np.empty(size, np.bool_)
+    made = _Composed(light, clipped, dark, unseen, share)
+    down, across = (max(1, -(-size // tile)) for size, tile in zip((height, width), _TILE, strict=True))
+
+    def tiles(start: int, stop: int) -> None:
+        for index in range(start, stop):
+            row, column = divmod(index, across)
+            rows = _part(row, down, height)
+            columns = _part(column, across, width)
+            _tile(made, lenses, joint, upright, rows, columns)
+
+    if workers is not None:
+        workers.run(down * across, 1, tiles, job)
+    else:
+        for index in range(down * across):
+            job.checkpoint(index, down * across)
+            tiles(index, index + 1)
+    return made
+
+
+def _part(index: int, parts: int, size: int) -> slice:
+    return slice(index * size // parts, (index + 1) * size // parts)
+
+
+def _looking(lens: _Lens) -> Callable[[F64], tuple[F32, Mask]]:
+    def look(directions: F64) -> tuple[F32, Mask]:
+        seen = lens.look(directions)
+        return seen.light, seen.seen
+
+    return look
+
+
+def _tile(
+    made: _Composed, lenses: list[_Lens], joint: Joint | None, upright: F64, rows: slice, columns: slice
+) -> None:
+    height, width = made.unseen.shape
+    u = (np.arange(columns.start, columns.stop) + 0.5) / width
+    v = (np.arange(rows.start, rows.stop) + 0.5) / height
+    directions = equirect_direction(u[None, :], v[:, None]) @ upright  # the inverse of upright @ d
+    place = (rows, columns)
+    front = lenses[0].look(directions)
+    if joint is None:
+        one = front.seen
+        made.light[place], made.share[place], made.unseen[place] = front.light, one, ~one
+        made.clipped[place], made.dark[place] = front.clipped, front.dark
+        return
+    back = lenses[1].look(directions)
+    azimuth = np.arctan2(directions[..., 1], directions[..., 0])
+    theta = np.arccos(np.clip(-directions[..., 2], -1, 1))
+    share = joint.share(azimuth, theta)
+    share = np.where(front.seen & back.seen, share, front.seen.astype(np.float32))
+    light = front.light * share[..., None] + back.light * (1 - share)[..., None]
+    near = (theta > joint.strip.low) & (theta < joint.strip.high)
+    if near.any():
+        factor = joint.evened(azimuth, theta, share)
+        if factor is not None:
+            light *= factor
+    first = share >= 0.5
+    made.light[place], made.share[place] = light, share
+    made.unseen[place] = ~(front.seen | back.seen)
+    made.clipped[place] = np.where(first, front.clipped, back.clipped)
+    made.dark[place] = np.where(first, front.dark, back.dark)
+
+
+def _ones(mask: Mask) -> F32:
+    return np.ones(mask.shape, np.float32)
