@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -35,7 +35,7 @@ def stitch(
 ) -> Stitched:
     """The finished picture's light from one lens or two, before calibration.
 
-    `views`: by side; with both there must be a `registration`, whose lens, falloff and gain count (a
+    `views`: by side; with both there must be a `registration`, whose lens, circles, falloff and gain count (a
     registration of a single lens counts for its lens and falloff). What no lens sees is filled with the
     light of its surroundings and marked. Raises ValueError without views, Cancelled.
     """
@@ -143,7 +143,8 @@ def _lenses(views: Mapping[str, View], registration: Registration | None, pitch:
         frame, gain, falloff = np.eye(3), np.ones(3), None
         if registration is not None:
             lens = registration.lens
-            view = View(view.light, view.usable, view.circle, lens, view.clipped, view.dark)
+            moved = registration.front if side == FRONT else registration.back
+            view = replace(view, lens=lens, circle=moved or view.circle)
             if any(registration.falloff):
                 falloff = _falloff(registration.falloff, lens.half)
             if side == BACK and FRONT in views:
