@@ -32,6 +32,22 @@ def turn(degrees: tuple[float, float, float] | F64) -> F64:
     return np.asarray(np.eye(3) + sine * cross + versed * (cross @ cross), np.float64)
 
 
+def degrees_of(rotation: F64) -> tuple[float, float, float]:
+    """The axis times degrees of a rotation by less than half a turn: `turn` undone."""
+    axis = np.array(
+        [
+            rotation[2, 1] - rotation[1, 2],
+            rotation[0, 2] - rotation[2, 0],
+            rotation[1, 0] - rotation[0, 1],
+        ]
+    )
+    twice_sine = float(np.linalg.norm(axis))
+    angle = math.atan2(twice_sine, float(np.trace(rotation)) - 1)
+    scale = math.degrees(angle / twice_sine) if twice_sine > 1e-12 else math.degrees(0.5)
+    x, y, z = (float(a) * scale for a in axis)
+    return x, y, z
+
+
 def moved_points(
     points: npt.NDArray[Any],
     motion: Motion,
@@ -76,7 +92,7 @@ def warp(
     first, last = rows or (0, height)
     if not (any(motion.rotation) or motion.dx or motion.dy or motion.degrees):
         return frame[first:last].copy(), np.ones((last - first, width), np.bool_)
-    at = _sources(motion, (width, height), circle, lens, first, last)
+    at = source_points(motion, (width, height), circle, lens, (first, last))
     x, y = at[..., 0], at[..., 1]
     known = (x >= 0.5) & (x <= width - 0.5) & (y >= 0.5) & (y <= height - 0.5)
     if circle is not None:
@@ -98,13 +114,18 @@ def _in_plane(motion: Motion) -> Motion:
     return Motion(motion.dx, motion.dy, motion.degrees)
 
 
-def _sources(
-    motion: Motion, size: tuple[int, int], circle: Circle | None, lens: Lens | None, first: int, last: int
+def source_points(
+    motion: Motion,
+    size: tuple[int, int],
+    circle: Circle | None = None,
+    lens: Lens | None = None,
+    rows: tuple[int, int] | None = None,
 ) -> F32:
     """(rows, W, 2) points of the frame for the pixels of these rows: exact at a grid, linear between."""
     import cv2
 
     width = size[0]
+    first, last = rows or (0, size[1])
     cell = _CELL if circle is None else max(2, min(_CELL, int(circle.radius / 24)))
     columns = -(-width // cell) + 2
     start = first // cell - 1

@@ -32,7 +32,7 @@ def test_turns_are_rotations_and_turn_back(x: float, y: float, z: float) -> None
 
 @given(small, small, small, st.sampled_from([EQUIDISTANT, EQUISOLID]))
 def test_points_come_back_from_a_turn_in_space(x: float, y: float, z: float, model: str) -> None:
-    points = np.random.default_rng(1).uniform(-60, 60, (50, 2)) + [CIRCLE.x, CIRCLE.y]
+    points = np.random.default_rng(1).uniform(-60, 60, (50, 2)) + np.array([CIRCLE.x, CIRCLE.y])
     lens = Lens(model, 190.0)
     there = moved_points(points, Motion(rotation=(x, y, z)), SIZE, CIRCLE, lens)
     back = moved_points(there, Motion(rotation=(-x, -y, -z)), SIZE, CIRCLE, lens)
@@ -48,7 +48,7 @@ def test_motions_in_the_plane_keep_distances(dx: float, dy: float, degrees: floa
     )
     centre = np.array(SIZE) / 2
     np.testing.assert_allclose(
-        moved_points(centre, Motion(dx, dy, degrees), SIZE), centre + [dx, dy], atol=1e-9
+        moved_points(centre, Motion(dx, dy, degrees), SIZE), centre + np.array([dx, dy]), atol=1e-9
     )
 
 
