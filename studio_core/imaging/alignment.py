@@ -1,27 +1,29 @@
 """Aligning hand-held exposures: how each frame of a bracket is moved against the reference.
 
 Consecutive exposures are compared as local contrast of their logarithms (`local_contrast`), from small to
-large sizes, by a robust second-order minimisation (Malis 2004) of the motion that makes them equal; the
-maximum of their correlation is what enhanced correlation (Evangelidis and Psarakis 2008) looks for too.
-Motions are chained to the reference. Where the correlation stays below 0.6, where the motion is too large
-for a hand, or where a direction is not determined by the content, the frame counts as not moved and not
-trusted: a featureless wall says nothing about motion.
+large sizes, by descent to the motion that makes them alike (`frame_matching`): what enhanced correlation
+(Evangelidis and Psarakis 2008) does, for turns of a lens in space too, and robust. Every frame is compared
+with its neighbour as the reference would show it. Where the correlation is not surely above 0.6, where the
+motion is too large for a hand, or where the content leaves a direction open, the frame counts as not moved
+and not trusted: a featureless wall says nothing about motion.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
 
 from studio_core.capturing.artifacts import Motion
-from studio_core.imaging.local_contrast import Level, normalised, sizes_of
+from studio_core.imaging.frame_matching import Fit, Found, Seen, sampled
+from studio_core.imaging.hand_motion import Place, scaled
+from studio_core.imaging.local_contrast import Level, sizes_of
 from studio_core.imaging.projection import Circle, Lens
-from studio_core.imaging.warping import degrees_of, source_points, turn, warp
+from studio_core.imaging.warping import source_points, warp
 
 __all__ = ["align_frames", "warp"]
 
@@ -33,9 +35,8 @@ MOST_DEGREES = 9.0
 MOST_SHIFT = 0.1  # of the longer side
 MOST_DOUBT = 2e-3  # of the longer side: standard deviation of the worst direction's shift
 _FINEST = 1000  # pixels across the finest size that is compared
-_INSIDE = 0.95  # of the circle's radius: outside it the frame's reflections stay put
-_ENOUGH = 200  # pixels that must have content in both
-_ALIKE = 16.0  # neighbouring pixels that err alike
+_WANDERED = 1.5  # pixels of the size that is believed, to where the finest ends
+_SEARCHED = 260  # pixels across the largest size that is seen with its clipped parts
 
 
 class Checkpoints(Protocol):
@@ -43,179 +44,6 @@ class Checkpoints(Protocol):
 
     def checkpoint(self, done: int = 0, total: int = 0, /) -> None:
         """Reports progress; raises `Cancelled` when the job was cancelled."""
-
-
-@dataclass(frozen=True)
-class _Place:
-    """The part of the picture that is compared, in its own pixels, and what may move in it.
-
-    Behind a fisheye: a turn in space about x, y and z (degrees), then a shift of the circle itself, as the
-    stabiliser of a phone or a film scan makes it (pixels). Else: a shift and a turn about the middle.
-    """
-
-    size: tuple[int, int]
-    circle: Circle | None
-    lens: Lens | None
-
-    @property
-    def expected(self) -> F64:
-        """Standard deviations of hands, before anything is seen."""
-        if self.circle is None:
-            far = 0.05 * max(self.size)
-            return np.array([far, far, 2.0])
-        loose = 0.004 * self.circle.radius
-        return np.array([4.0, 4.0, 3.0, loose, loose])
-
-    @property
-    def starts(self) -> list[Motion]:
-        """Where to look for a hand's motion that is too far for descending from rest."""
-        if self.circle is not None:
-            angles = (0.0, -6.0, -3.0, 3.0, 6.0)
-            tried = [(x, y) for x in angles for y in angles]
-            return [Motion(rotation=(x, y, 0.0)) for x, y in sorted(tried, key=lambda at: math.hypot(*at))]
-        far = [0.03 * i * max(self.size) for i in range(-3, 4)]
-        tried = [(x, y) for x in far for y in far]
-        return [Motion(x, y) for x, y in sorted(tried, key=lambda at: math.hypot(*at))]
-
-    def smaller(self, by: float) -> _Place:
-        """The same, seen `by` times as small."""
-        size = (round(self.size[0] / by), round(self.size[1] / by))
-        return _Place(size, self.circle.scaled(1 / by) if self.circle else None, self.lens)
-
-    def values(self, motion: Motion) -> F64:
-        """What moves, as numbers."""
-        if self.circle is None:
-            return np.array([motion.dx, motion.dy, motion.degrees])
-        return np.array([*motion.rotation, motion.dx, motion.dy])
-
-    def after(self, motion: Motion, step: F64) -> Motion:
-        """`motion` of what was moved by the small `step` before."""
-        if self.circle is None:
-            angle = math.radians(motion.degrees)
-            c, s = math.cos(angle), math.sin(angle)
-            dx, dy = motion.dx + c * step[0] - s * step[1], motion.dy + s * step[0] + c * step[1]
-            return Motion(dx, dy, motion.degrees + step[2])
-        turned = degrees_of(turn(motion.rotation) @ turn(step[:3]))
-        return Motion(motion.dx + step[3], motion.dy + step[4], rotation=turned)
-
-    def columns(self) -> F32:
-        """(h, w, n, 2): how far a pixel moves for one unit of each number, about rest."""
-        width, height = self.size
-        flat = np.zeros((height, width, 2, 2), np.float32)
-        flat[..., 0, 0] = flat[..., 1, 1] = 1
-        x, y = np.meshgrid(
-            np.arange(width, dtype=np.float32) + 0.5, np.arange(height, dtype=np.float32) + 0.5
-        )
-        if self.circle is None:
-            about = np.stack([height / 2 - y, x - width / 2], axis=-1) * np.float32(math.pi / 180)
-            return np.concatenate([flat, about[:, :, None]], axis=2, dtype=np.float32)
-        here = np.stack([x, y], axis=-1)
-        small = 0.01
-        turns = [
-            (source_points(Motion(rotation=axis), self.size, self.circle, self.lens) - here) / small
-            for axis in ((small, 0.0, 0.0), (0.0, small, 0.0), (0.0, 0.0, small))
-        ]
-        return np.concatenate([np.stack(turns, axis=2), flat], axis=2).astype(np.float32)
-
-    def inside(self) -> F32:
-        """(h, w) 1 where pixels are compared."""
-        width, height = self.size
-        if self.circle is None:
-            return np.ones((height, width), np.float32)
-        x, y = np.arange(width) + 0.5 - self.circle.x, np.arange(height) + 0.5 - self.circle.y
-        far = np.hypot(x[None, :], y[:, None])
-        return (far < _INSIDE * self.circle.radius).astype(np.float32)
-
-
-@dataclass(frozen=True)
-class _Found:
-    """A motion, how well the two agree there, and how far its least certain direction may be off, pixels."""
-
-    motion: Motion
-    correlation: float
-    doubt: float
-
-
-class _Fit:
-    """One size of the comparison of a frame with what is known of the reference."""
-
-    def __init__(self, place: _Place, columns: F32) -> None:
-        self.place, self.columns = place, columns
-        self.inside = place.inside()
-        shift = columns[self.inside > 0]
-        self.reach = np.einsum("nic,njc->ij", shift, shift, dtype=np.float64) / max(len(shift), 1)
-
-    def improved(self, known: _Seen, frame: Level, motion: Motion, steps: int) -> _Found:
-        """Descends from `motion`; the correlation is that of the last step's start."""
-        prior = 1 / self.place.expected**2
-        found = _Found(motion, 0.0, math.inf)
-        for _ in range(steps):
-            at = source_points(motion, self.place.size, self.place.circle, self.place.lens)
-            first, second, both = self._compared(known, _sampled(frame, at))
-            if np.count_nonzero(both) < _ENOUGH:
-                return found
-            correlation, information, pull = self._equations(first, second, both)
-            wanted = information + np.diag(prior)
-            step: F64 = np.linalg.solve(wanted, pull - prior * self.place.values(motion))
-            worst = np.linalg.eigvals(np.linalg.solve(wanted, self.reach)).real.max()
-            if correlation < found.correlation - 0.02:
-                break
-            found = _Found(motion, correlation, math.sqrt(max(worst, 0.0)))
-            moved = math.sqrt(step @ self.reach @ step)
-            if moved > 0.1 * max(self.place.size):
-                break
-            motion = self.place.after(motion, step)
-            if moved < 0.01:
-                return _Found(motion, correlation, found.doubt)
-        return found if steps > 1 else _Found(motion, found.correlation, found.doubt)
-
-    def _compared(self, known: _Seen, seen: _Seen) -> tuple[F32, F32, npt.NDArray[np.bool_]]:
-        """Local contrast of both where both are valid."""
-        import cv2
-
-        valid = known.valid * seen.valid * self.inside
-        first, sure = normalised(known.log, valid, known.noise)
-        second, _ = normalised(seen.log, valid, seen.noise)
-        both = cv2.erode(sure, np.ones((3, 3), np.uint8), borderValue=0) > 0
-        return first, second, both
-
-    def _equations(self, first: F32, second: F32, both: npt.NDArray[np.bool_]) -> tuple[float, F64, F64]:
-        """Correlation, information (n, n) and its right side (n,) of a step that makes `second` `first`."""
-        import cv2
-
-        mean = (first + second) * np.float32(1 / 64)
-        slope = np.stack([cv2.Scharr(mean, -1, 1, 0)[both], cv2.Scharr(mean, -1, 0, 1)[both]], axis=-1)
-        a, b = first[both], second[both]
-        difference = a - b
-        spread = max(1.4826 * float(np.median(np.abs(difference))), 1e-3)
-        weight = 1 / np.square(1 + np.square(difference / np.float32(2.5 * spread)))
-        correlation = float((weight * a) @ b) / math.sqrt(
-            max(float((weight * a) @ a) * float((weight * b) @ b), 1e-30)
-        )
-        lines = np.einsum("nic,nc->ni", self.columns[both], slope)
-        scale = 1 / (_ALIKE * spread**2)
-        weighted = lines * weight[:, None]
-        information = (weighted.T @ lines).astype(np.float64) * scale
-        pull = (weighted.T @ difference).astype(np.float64) * scale
-        return correlation, information, pull
-
-
-@dataclass(frozen=True, eq=False)
-class _Seen:
-    """A size of a frame as the reference would show it."""
-
-    log: F32
-    valid: F32
-    noise: float
-
-
-def _sampled(level: Level, at: F32) -> _Seen:
-    import cv2
-
-    x, y = at[..., 0] - np.float32(0.5), at[..., 1] - np.float32(0.5)
-    log = cv2.remap(level.log, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-    valid = cv2.remap(level.valid, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT)
-    return _Seen(np.asarray(log, np.float32), (valid > 0.999).astype(np.float32), level.noise)
 
 
 class _Bracket:
@@ -234,51 +62,80 @@ class _Bracket:
         first = self.frames[0]
         within = None if circle is None else Circle(circle.x - box[0], circle.y - box[1], circle.radius)
         size = (first.levels[0].size[0] * first.factor, first.levels[0].size[1] * first.factor)
-        self.place = _Place(size, within, lens)
-        self.fits: list[_Fit] = []
+        self.place = Place(size, within, lens)
+        self.fits: list[Fit] = []
         for index, level in enumerate(first.levels):
             place = self.place.smaller(first.factor * 2**index)
             assert place.size == level.size
-            self.fits.append(_Fit(place, place.columns()))
+            self.fits.append(Fit(place, place.columns()))
 
-    def compare(self, index: int, other: int, motion: Motion) -> _Found:
-        """How frame `index` is moved, from frame `other`, which is moved by `motion`."""
-        frame, known = self.frames[index], self.frames[other]
-        best = _Found(motion, 0.0, math.inf)
-        trusted = 0.0
+    def compare(self, index: int, other: int, motion: Motion) -> Found:
+        """How frame `index` is moved, from frame `other`, which is moved by `motion`.
+
+        Small sizes see what is clipped as flat, which keeps the outlines of windows; large ones leave it
+        out, which is exact, unless too little else is there.
+        """
+        last = len(self.fits) - 1
+        small = [at for at, fit in enumerate(self.fits) if max(fit.place.size) <= _SEARCHED or at == last]
+        begun = Found(motion)
         for at in reversed(range(len(self.fits))):
-            fit, by = self.fits[at], known.factor * 2**at
-            points = source_points(_scaled(motion, 1 / by), fit.place.size, fit.place.circle, fit.place.lens)
-            seen = _sampled(known.levels[at], points)
-            level = frame.levels[at]
-            if at == len(self.fits) - 1:
-                best = self._begun(fit, seen, level, _scaled(motion, 1 / by))
-            else:
-                best = fit.improved(seen, level, _scaled(best.motion, 1 / by), 6 if at > 1 else 4)
-            best = _Found(_scaled(best.motion, by), best.correlation, best.doubt * by)
-            if min(fit.place.size) >= 150 or at == 0:
-                trusted = max(trusted, best.correlation)
-        return _Found(best.motion, trusted, best.doubt)
+            if at in small:
+                begun = self._at(index, other, at, motion, begun, cut=True)
+        exact = self._finer(index, other, min(small), motion, begun, cut=False)
+        if exact.sure >= LEAST_CORRELATION or begun.sure < LEAST_CORRELATION:
+            return exact
+        return self._finer(index, other, min(small), motion, begun, cut=True)
 
-    def _begun(self, fit: _Fit, seen: _Seen, level: Level, motion: Motion) -> _Found:
+    def _finer(self, index: int, other: int, start: int, motion: Motion, begun: Found, cut: bool) -> Found:
+        """From size `start` to the finest. The finest may be noisier than the one before, which is believed
+        then, but not when the finest led away from it."""
+        factor = self.frames[0].factor
+        best, most, pixel = begun, Found(motion), factor
+        for at in reversed(range(start + 1)):
+            best = self._at(index, other, at, motion, best, cut)
+            if math.isinf(best.doubt):
+                return best
+            if best.sure > most.sure:
+                most, pixel = best, factor * 2**at
+        if self.fits[0].apart(most.motion, best.motion, factor) > _WANDERED * pixel:
+            return replace(best, sure=min(best.sure, most.sure))
+        return replace(best, correlation=most.correlation, sure=most.sure)
+
+    def _at(self, index: int, other: int, at: int, motion: Motion, best: Found, cut: bool) -> Found:
+        """One size: descends from the best so far, or looks around where there is none."""
+        fit, by = self.fits[at], self.frames[0].factor * 2**at
+        place, rest = fit.place, scaled(motion, 1 / by)
+        seen = sampled(
+            self.frames[other].levels[at], source_points(rest, place.size, place.circle, place.lens)
+        )
+        level = self.frames[index].levels[at]
+        if math.isinf(best.doubt):
+            found = self._begun(fit, seen, level, rest, cut)
+        else:
+            found = fit.improved(seen, level, scaled(best.motion, 1 / by), 6 if at > 1 else 4, cut)
+        return replace(found, motion=scaled(found.motion, by), doubt=found.doubt * by)
+
+    def _begun(self, fit: Fit, seen: Seen, level: Level, motion: Motion, cut: bool) -> Found:
         """The best start at the smallest size: at rest against the other frame, or all around."""
-        best = fit.improved(seen, level, motion, 8)
+        best = fit.improved(seen, level, motion, 8, cut)
         if best.correlation > 0.85:
             return best
-        for start in fit.place.starts:
-            tried = fit.improved(seen, level, fit.place.after(motion, fit.place.values(start)), 5)
-            if tried.correlation > best.correlation + 0.01:
-                best = tried
+        tried = [
+            fit.improved(seen, level, fit.place.after(motion, fit.place.values(start)), 2, cut)
+            for start in fit.place.starts
+        ]
+        for found in sorted(tried, key=lambda one: -one.sure)[:4]:
+            best = max(best, fit.improved(seen, level, found.motion, 6, cut), key=lambda one: one.sure)
         return best
 
-    def believed(self, found: _Found) -> bool:
+    def believed(self, found: Found) -> bool:
         """Whether it is a hand's motion that the content determines."""
         longest = max(self.place.size)
         motion = found.motion
         return (
             math.hypot(motion.dx, motion.dy) <= MOST_SHIFT * longest
             and math.hypot(*motion.rotation, motion.degrees) <= MOST_DEGREES
-            and found.correlation >= LEAST_CORRELATION
+            and found.sure >= LEAST_CORRELATION
             and found.doubt <= MOST_DOUBT * longest
         )
 
@@ -288,10 +145,6 @@ class _Bracket:
         x = self.box[0] + (self.place.size[0] - self.whole[0]) / 2
         y = self.box[1] + (self.place.size[1] - self.whole[1]) / 2
         return replace(motion, dx=motion.dx + x - c * x + s * y, dy=motion.dy + y - s * x - c * y)
-
-
-def _scaled(motion: Motion, by: float) -> Motion:
-    return Motion(motion.dx * by, motion.dy * by, motion.degrees, rotation=motion.rotation)
 
 
 def align_frames(
@@ -332,7 +185,7 @@ def _against_trusted(bracket: _Bracket, index: int, motions: dict[int, Motion]) 
     """Compared with the nearest frames whose motion is known, until one of them answers."""
     known = sorted((i for i, m in motions.items() if m.trusted), key=lambda i: abs(i - index))
     best = 0.0
-    for other in known[:3]:
+    for other in known[:2]:
         found = bracket.compare(index, other, motions[other])
         if bracket.believed(found):
             return replace(found.motion, correlation=found.correlation)

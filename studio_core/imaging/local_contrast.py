@@ -7,6 +7,7 @@ Windows that hold nothing but noise are not blown up: the noise is part of the v
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -19,15 +20,18 @@ WINDOW = 17  # pixels of a level, in which contrast is measured
 _LEAST = 0.01  # of contrast, natural logarithm: below, a surface has no features
 _NOISE = 3.0  # standard deviations of noise that count as no contrast
 _SMALLEST = 48
+_STEP = 0.29 / 255  # standard deviation of what rounding to bytes does
 
 
 @dataclass(frozen=True, eq=False)
 class Level:
-    """One size of a frame: `log` (h, w) natural logarithm of numbers, `valid` (h, w) 0 or 1, and the
-    standard deviation of its numbers' `noise`, in the unit whose logarithm is taken."""
+    """One size of a frame: `log` (h, w) natural logarithm of numbers, and the standard deviation of their
+    `noise`, in the unit whose logarithm is taken. `valid` (h, w): 1 where pixels are neither clipped nor
+    black; `kept`: 1 where the picture is."""
 
     log: F32
     valid: F32
+    kept: F32
     noise: float
 
     @property
@@ -70,6 +74,7 @@ def sizes_of(frame: npt.NDArray[Any], box: tuple[int, int, int, int], finest: in
     else:
         numbers /= np.float32(np.iinfo(frame.dtype).max)
     room = (max(-top, 0), height, max(-left, 0), width)
+    kept = _padded(np.ones_like(numbers), room)
     numbers, unclipped = _padded(numbers, room), _padded(unclipped, room)
 
     def smaller(a: F32, by: int) -> F32:
@@ -78,11 +83,14 @@ def sizes_of(frame: npt.NDArray[Any], box: tuple[int, int, int, int], finest: in
 
     levels = []
     for index in range(count):
-        numbers, unclipped = (smaller(a, factor if index == 0 else 2) for a in (numbers, unclipped))
-        noise = max(_noise(numbers, unclipped), 0.1 / 255 / (factor * 2**index))
+        by = factor if index == 0 else 2
+        numbers, unclipped, kept = (smaller(a, by) for a in (numbers, unclipped, kept))
+        noise = max(_noise(numbers, unclipped), _STEP / math.sqrt(factor * 2**index))
         offset = np.float32(max(2 * noise, 0.3 / 255))
         valid = ((unclipped > 0.999) & (numbers > 0.5 * offset)).astype(np.float32)
-        levels.append(Level(np.log(np.maximum(numbers, 0) + offset), valid, noise))
+        levels.append(
+            Level(np.log(np.maximum(numbers, 0) + offset), valid, (kept > 0.999).astype(np.float32), noise)
+        )
     return Sizes(left, top, factor, tuple(levels))
 
 
