@@ -43,7 +43,7 @@ def strip(data: bytes) -> Bare | None:
 
 
 def exif_of(data: bytes) -> bytes:
-    """The Exif block of a JPEG, PNG, WebP or TIFF file (a TIFF file is one); b"" without one."""
+    """The Exif block of a WebP or TIFF file (which is one), or of one that `strip` knows; b"" for none."""
     if data[:4] in (b"II*\0", b"MM\0*"):
         return data
     if data[:4] == b"RIFF" and data[8:12] == b"WEBP":

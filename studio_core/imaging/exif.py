@@ -41,10 +41,14 @@ _ISO_UNTOLD = 65535  # what the 16 bits of the tag hold when the number is large
 
 @dataclass(frozen=True)
 class Told:
-    """What an Exif block tells: the facts without the file's name, and Exif's orientation 1 … 8."""
+    """What an Exif block tells: the facts without the file's name."""
 
     facts: ShotFacts = ShotFacts("")
-    orientation: int = 1
+
+    @property
+    def orientation(self) -> int:
+        """Exif's, 1 … 8."""
+        return self.facts.orientation
 
 
 def read_exif(block: bytes) -> Told:
@@ -60,8 +64,7 @@ def read_exif(block: bytes) -> Told:
     first = _entries(block, order, struct.unpack(order + "I", block[4:8])[0], _PICTURE)
     details = first.pop("details", None)
     told = first | (_entries(block, order, details, _EXPOSURE) if isinstance(details, int) else {})
-    turn = told.get("orientation")
-    return Told(_facts(told), turn if isinstance(turn, int) and 1 <= turn <= 8 else 1)
+    return Told(_facts(told))
 
 
 def orientation_block(orientation: int) -> bytes:
@@ -133,8 +136,10 @@ def _facts(told: Mapping[str, Any]) -> ShotFacts:
     names = ("iso", "recommended_index", "standard_sensitivity", "iso_speed")
     speeds = [told[name] for name in names if name in told and told[name] != _ISO_UNTOLD]
     speed = next((s for s in speeds if plausible(s, 1, 1e7)), None)
+    turn = told.get("orientation")
     return ShotFacts(
         name="",
+        orientation=turn if isinstance(turn, int) and 1 <= turn <= 8 else 1,
         **exposure(seconds, speed, aperture),
         bias=plausible(told.get("bias"), -20, 20),
         taken=_taken(told),

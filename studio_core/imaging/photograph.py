@@ -14,7 +14,8 @@ import numpy.typing as npt
 class ShotFacts:
     """What a photograph's metadata tell; None or "" where they don't. Positions are never read.
 
-    `taken`: seconds, camera's own clock, any origin. `bias`: EV of the exposure correction.
+    `taken`: seconds, camera's own clock, any origin. `bias`: EV of the exposure correction. `orientation`:
+    Exif's (1 … 8), by which the pixels were turned upright.
     """
 
     name: str
@@ -25,6 +26,7 @@ class ShotFacts:
     taken: float | None = None
     camera: str = ""
     lens: str = ""
+    orientation: int = 1
 
     @property
     def ev(self) -> float | None:

@@ -68,7 +68,8 @@ def read_photograph(
             pixels = np.nan_to_num(pixels, nan=0.0, posinf=brightest, neginf=0.0)
         pixels = np.maximum(pixels, np.float32(0))
         pixels.flags.writeable = False
-    shot = replace(_facts(facts, data), name=Path(called).name)
+    exif = base64.b64decode(facts.exif) or (bare.exif if bare else exif_of(data))
+    shot = replace(_facts(facts, read_exif(exif)), name=Path(called).name)
     digest = content_hash(np.frombuffer(data, np.uint8))
     return Photograph(pixels, shot, digest, tuple(facts.notes), tuple(facts.colour))
 
@@ -123,9 +124,8 @@ def kind_of(data: bytes, name: str) -> str:
     return ".jpg" if data.startswith(b"\xff\xd8") else found
 
 
-def _facts(facts: Facts, data: bytes) -> ShotFacts:
+def _facts(facts: Facts, told: Told) -> ShotFacts:
     """What Exif tells, and where it is silent what the decoder found."""
-    told: Told = read_exif(base64.b64decode(facts.exif) if facts.exif else exif_of(data))
     if not facts.told:
         return told.facts
     also: dict[str, Any] = dict(exposure(*(facts.told.get(n) for n in ("seconds", "iso", "aperture"))))

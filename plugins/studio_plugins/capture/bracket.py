@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -27,6 +27,7 @@ from studio_core.shading.job import Job
 from studio_plugins.capture.bracket_exposures import Exposed, completed, listed_exposures
 from studio_plugins.capture.bracket_looks import Look, dark_ends, goes_round, look_at, two_discs, well_exposed
 from studio_plugins.capture.bracket_sides import Member, in_order, part
+from studio_plugins.capture.bracket_turns import turned_back
 
 _WIDE = (1.6, 2.4)  # aspects in which two circles may lie side by side
 _TWICE_AS_WIDE = (1.98, 2.02)
@@ -98,6 +99,11 @@ def _usable(
                 taken.append(_Taken(photograph, look, shot, name))
                 continue
         notes.append(f"{name} is the same photograph as {same.name} and is left out.")
+    looked = turned_back([(t.photograph, t.look) for t in taken])
+    for place, (photograph, look, turned) in enumerate(looked):
+        if turned:
+            taken[place] = replace(taken[place], photograph=photograph, look=look)
+            notes.append(f"{taken[place].name} was turned to stand as the others that show the same.")
     if not taken:
         raise InputError("Every photograph is left out: at least one is needed.")
     return taken

@@ -286,6 +286,32 @@ def test_pictures_of_all_directions_and_wide_frames_are_told_apart() -> None:
     assert arrange(shots, BracketSettings(layout=SINGLE)).layout == SINGLE
 
 
+@pytest.mark.parametrize("turned", [3, 6, 8])
+def test_a_phone_that_changed_its_mind_about_up_is_undone(turned: int) -> None:
+    shots = heap()
+    quarters = {3: 2, 6: -1, 8: 1}[turned]
+    odd = replace(
+        shots[1],
+        pixels=np.ascontiguousarray(np.rot90(shots[1].pixels, quarters)),
+        facts=replace(shots[1].facts, orientation=turned),
+    )
+    brackets = arrange([shots[0], odd, *shots[2:]], BracketSettings())
+    assert names(brackets, FRONT)[0] == odd.facts.name
+    np.testing.assert_array_equal(brackets.sides[FRONT].shots[0].pixels, shots[1].pixels)
+    assert brackets.notes == (f"{odd.facts.name} was turned to stand as the others that show the same.",)
+
+
+def test_a_back_that_was_taken_upright_stays_so() -> None:
+    shots = heap()
+    for place in (3, 4, 5):
+        facts = replace(shots[place].facts, orientation=6)
+        pixels = np.ascontiguousarray(np.rot90(shots[place].pixels, 1))
+        shots[place] = replace(shots[place], pixels=pixels, facts=facts)
+    brackets = arrange(shots, BracketSettings())
+    assert {s.size for s in brackets.sides[BACK].shots} == {SIZE[::-1]}
+    assert brackets.notes == ()
+
+
 def test_nothing_to_work_with_is_said_in_a_sentence() -> None:
     with pytest.raises(InputError, match="no photographs"):
         arrange([], BracketSettings())

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from photo_support import ASCII, RATIONAL, SHORT, SIGNED, exif_block, shot_exif
 
 from studio_core.imaging.exif import Told, orientation_block, read_exif
+from studio_core.imaging.photograph import ShotFacts
 
 
 @pytest.mark.parametrize("order", ["<", ">"])
@@ -101,4 +102,4 @@ def test_a_directory_that_leads_to_itself_ends() -> None:
 
 @pytest.mark.parametrize("turn", range(1, 9))
 def test_the_smallest_block_tells_the_orientation(turn: int) -> None:
-    assert read_exif(orientation_block(turn)) == Told(orientation=turn)
+    assert read_exif(orientation_block(turn)) == Told(ShotFacts("", orientation=turn))
