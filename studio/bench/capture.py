@@ -65,11 +65,12 @@ class Setup:
     radius: float = 420.0
     width: int = 1024
     captures: int = 200
+    heaps: int = 20
     clone: tuple[int, int] = (1000, 1000)
     megapixels: float = 12.0
 
 
-QUICK = Setup(phones=1, radius=220.0, width=512, captures=24, clone=(500, 500), megapixels=1.0)
+QUICK = Setup(phones=1, radius=220.0, width=512, captures=24, heaps=2, clone=(500, 500), megapixels=1.0)
 
 
 def run(report: Report, program: Headless) -> None:
@@ -88,8 +89,12 @@ def run(report: Report, program: Headless) -> None:
 
 
 def _others(report: Report, program: Headless, setup: Setup, maps: Mapping[str, Path]) -> None:
-    from studio.bench import capture_clone, capture_pipeline
+    from studio.bench import capture_brackets, capture_clone, capture_pipeline
 
+    if report.wants("brackets") and maps:
+        rooms = {name: read_map(path) for name, path in maps.items()}
+        capture_brackets.measure(report, rooms, setup.heaps)
+        report.keep()
     if report.wants("clone"):
         capture_clone.measure(report, setup.clone)
         report.keep()
