@@ -88,10 +88,14 @@ def _segments(data: bytes) -> Iterator[tuple[int, bytes]]:
         if at + 2 > len(data):
             return
         end = at + max(struct.unpack_from(">H", data, at)[0], 2)
+        if end > len(data):  # cut off
+            return
+        body = data[at:end]
         if marker == _SCAN:
             behind = _SCAN_END.search(data, end)
+            body += data[end : behind.start()] if behind else data[end:].rstrip(b"\xff")
             end = behind.start() if behind else len(data)
-        yield marker, b"\xff" + bytes([marker]) + data[at:end]
+        yield marker, b"\xff" + bytes([marker]) + body
         at = end
 
 
