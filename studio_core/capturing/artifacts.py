@@ -63,27 +63,40 @@ class Response:
     """How light became numbers: `curve` (3, L) log2 exposure of the L levels of red, green and blue.
 
     Levels are 0 … L−1 over 0 … `top` of the pixels' numbers (linear in between), strictly rising inside
-    `black` … `white`; 0 at the middle level. `noise`: (2,) variance of a number n (in 0…1) is about
-    noise[0] + noise[1] · n.
+    `black` … `white`; 0 at the middle level. Exposure is light · 2^EV. `noise`: (3,) variance of a number n
+    in 0 … 1 is about noise[0] + s² (noise[1] + noise[2] · E) at the exposure E, s = dn / dE: rounding and
+    compression, the sensor's reading, photons. `linear`: numbers are light, whatever lies between levels.
     """
 
     curve: F64
     top: float
     black: tuple[float, float, float]
     white: tuple[float, float, float]
-    noise: tuple[float, float]
+    noise: tuple[float, float, float]
     measured: bool = True
     rms: float = 0.0
     """Of what the curve leaves unexplained, log2."""
+    linear: bool = False
+    balance: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """log2 to add to the curves of red, green and blue so that full numbers are white: channels with curves
+    of their own are alike at their ends, not in the middle."""
+    notes: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
 class Exposures:
-    """Solved EV of one bracket's shots beside the listed ones; `wrong`: shots whose step differs > 0.3 EV."""
+    """Solved EV of one bracket's shots beside the listed ones (same origin).
+
+    `wrong`: shots that were exposed more than 0.3 EV otherwise than listed, against most of the others.
+    `notes` say it in whole sentences. `tints`: how much more red, green and blue each shot is exposed than
+    its EV says, EV (a camera's white balance drifts); empty for nothing.
+    """
 
     listed: tuple[float, ...]
     solved: tuple[float, ...]
     wrong: tuple[int, ...] = ()
+    notes: tuple[str, ...] = ()
+    tints: tuple[tuple[float, float, float], ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,7 +104,8 @@ class LensLight:
     """Merged light of one side in its reference frame: (H, W, 3) linear, one scale for both sides.
 
     `clipped`: brighter than any exposure resolves (at least the value given); `dark`: darker than any;
-    `moved`: one exposure alone was used; `noise` (H, W): relative standard deviation of luminance.
+    `moved`: an exposure was left out because something moved; `noise` (H, W): relative standard deviation
+    of luminance, 1 where nothing resolves it.
     """
 
     light: F32
@@ -101,6 +115,7 @@ class LensLight:
     noise: F32
     motions: tuple[Motion, ...]
     exposures: Exposures
+    notes: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
