@@ -15,10 +15,10 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from studio_core.imaging.curve_spline import KNOTS, basis, knot_logs, ordinary_shapes
 from studio_core.imaging.exposure_check import shared_scale
 
 F64 = npt.NDArray[np.float64]
-KNOTS = 48
 STEP_SPREAD = 0.3
 """EV, of listed steps around the true ones."""
 TINT_SPREAD = 0.05
@@ -32,7 +32,6 @@ _LEAST = 0.15  # contrast
 _ROUNDS = 12
 _SETTLED = 1e-3  # log2
 _DARK = 0.3  # numbers under which what compression adds shows
-_TOE, _SHOULDER = 0.01, 1.05
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,49 +61,6 @@ class Fit:
     tints: tuple[F64, ...]
     rms: float
     extra: F64
-
-
-def place(number: npt.ArrayLike) -> F64:
-    """Where numbers 0 … 1 lie along the spline, 0 … KNOTS − 3: closer knots near both ends."""
-    x = np.clip(np.asarray(number, np.float64), 0.0, 1.0)
-    ends = _coordinate(np.array([0.0, 1.0]))
-    return np.asarray((_coordinate(x) - ends[0]) / (ends[1] - ends[0]) * (KNOTS - 3), np.float64)
-
-
-def _coordinate(x: F64) -> F64:
-    return np.asarray(np.log2(x + _TOE) - 0.5 * np.log2(_SHOULDER - x), np.float64)
-
-
-def basis(number: npt.ArrayLike) -> F64:
-    """(..., KNOTS) uniform cubic B-splines at numbers 0 … 1."""
-    at = place(number)
-    first = np.minimum(at.astype(np.int64), KNOTS - 4)
-    t = at - first
-    parts = np.stack([(1 - t) ** 3, 3 * t**3 - 6 * t**2 + 4, -3 * t**3 + 3 * t**2 + 3 * t + 1, t**3], axis=-1)
-    made = np.zeros((*at.shape, KNOTS))
-    np.put_along_axis(made, first[..., None] + np.arange(4), parts / 6, axis=-1)
-    return made
-
-
-def _knot_logs() -> F64:
-    """log2 number that belongs to each coefficient (at the peak of its spline)."""
-    dense = np.linspace(0, 1, 20001)
-    number = np.interp(np.arange(KNOTS) - 1.0, place(dense), dense)
-    logs = np.log2(number + 0.004)
-    logs[0], logs[-1] = 2 * logs[1] - logs[2], 2 * logs[-2] - logs[-3]  # beyond the ends
-    return np.asarray(logs, np.float64)
-
-
-def _ordinary_shapes() -> F64:
-    """(M, KNOTS): powers, sRGB, toes and shoulders, whose sums most responses are close to."""
-    x = np.linspace(0, 1, 1001)[1:]
-    usual = np.where(x <= 0.04045, x / 12.92, ((x + 0.055) / 1.055) ** 2.4)
-    shapes = [np.ones_like(x), np.log2(x + 0.002), np.log2(usual), x, x**2, np.log2(_SHOULDER - x)]
-    splines = basis(x)
-    smooth = 1e-3 * np.diff(np.eye(KNOTS), 2, axis=0)
-    matrix = np.concatenate([splines, smooth])
-    right = np.concatenate([np.array(shapes).T, np.zeros((len(smooth), len(shapes)))])
-    return np.asarray(np.linalg.lstsq(matrix, right, rcond=None)[0].T, np.float64)
 
 
 def fit(
@@ -158,7 +114,7 @@ class _System:
         self.first_ev = self.curves + np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
         self.first_tint = int(self.first_ev[-1])
         self.first_shape = self.first_tint + 2 * sum(counts)
-        self.shapes = _ordinary_shapes() if self.curves else np.zeros((0, KNOTS))
+        self.shapes = ordinary_shapes() if self.curves else np.zeros((0, KNOTS))
         self.columns = self.first_shape + 3 * len(self.shapes)
         self.fixed: dict[int, float] = {}
         if not exposures:
@@ -249,7 +205,7 @@ class _System:
         """Always the same rows: little bends, channels alike, free sums set to 0."""
         rows: list[npt.NDArray[np.float64]] = []
         if self.known is None:
-            rise = np.diff(_knot_logs())
+            rise = np.diff(knot_logs())
             self.least = _LEAST * rise
             bend = np.zeros((KNOTS - 2, KNOTS))
             for k in range(KNOTS - 2):

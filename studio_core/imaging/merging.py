@@ -19,6 +19,7 @@ from studio_core.capturing.artifacts import Bracket, Exposures, LensLight, Mask,
 from studio_core.imaging.ghosts import Look as Reduced
 from studio_core.imaging.ghosts import left_out, reduced
 from studio_core.imaging.numbers import Look, Numbers
+from studio_core.imaging.photograph import in_rec709
 from studio_core.imaging.projection import Circle, Lens
 from studio_core.imaging.warping import warp
 from studio_core.parallel import Workers
@@ -56,7 +57,7 @@ def merge(
     lens: Lens | None = None,
     workers: Workers | None = None,
 ) -> LensLight:
-    """Light (H, W, 3) in the frame of the shot that does not move; light 1 is EV 0 at the middle number.
+    """Linear Rec.709 light (H, W, 3) as the shot that does not move shows it; 1 is EV 0's middle number.
 
     `motions` of the shots, in their order; `circle` and `lens` where they turn in space. `ghosts`: leave
     out, place by place, exposures that disagree with the best exposed one. Any order of the shots gives the
@@ -93,7 +94,8 @@ def merge(
 
     def band(first: int, last: int) -> None:
         parts = _band(frames, (first, last), circle, lens)
-        light[first:last], noise[first:last], masks[:, first:last] = parts
+        light[first:last] = in_rec709(parts[0], bracket.shots[0].colour)
+        noise[first:last], masks[:, first:last] = parts[1:]
 
     if workers is None:
         for first in range(0, height, rows):

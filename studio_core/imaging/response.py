@@ -15,7 +15,8 @@ import numpy.typing as npt
 
 from studio_core.capturing.artifacts import Bracket, Exposures, Motion, Response
 from studio_core.errors import InputError
-from studio_core.imaging.curve_fit import FEWEST, Fit, Sample, basis, fit, linked
+from studio_core.imaging.curve_fit import FEWEST, Fit, Sample, fit, linked
+from studio_core.imaging.curve_spline import basis
 from studio_core.imaging.exposure_check import compared, shared_scale
 from studio_core.imaging.levels import Levels, find_levels
 from studio_core.imaging.projection import Circle, Lens

@@ -190,6 +190,17 @@ def test_one_exposure_and_equal_exposures(shown: tuple[F64, Bracket]) -> None:
     assert np.median(both.noise[fair]) == pytest.approx(np.median(made.noise[fair]) / np.sqrt(2), rel=0.1)
 
 
+def test_colours_of_the_camera_become_those_of_the_house(shown: tuple[F64, Bracket]) -> None:
+    one = shown[1]
+    mixed = (1.2, -0.2, 0.0, 0.0, 1.0, 0.0, 0.1, -0.3, 1.2)
+    shots = tuple(replace(s, colour=mixed) for s in one.shots)
+    plain = merge(one, still(4), exact(Camera()), known(EVS))
+    made = merge(replace(one, shots=shots), still(4), exact(Camera()), known(EVS))
+    np.testing.assert_allclose(
+        made.light, (plain.light @ np.reshape(mixed, (3, 3)).T).clip(0), rtol=1e-4, atol=1e-6
+    )
+
+
 def test_numbers_that_are_none_do_not_spread() -> None:
     light = room(8, 60, 40).astype(np.float32)
     light[10, 10], light[20, 20, 1] = np.nan, np.inf

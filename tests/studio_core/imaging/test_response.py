@@ -9,7 +9,7 @@ from camera_support import FAMILIES, Camera, bracket, room, taken
 
 from studio_core.capturing.artifacts import Exposures, Response
 from studio_core.errors import InputError
-from studio_core.imaging.curve_fit import KNOTS, basis
+from studio_core.imaging.curve_spline import KNOTS, basis
 from studio_core.imaging.exposure_check import compared, shared_scale
 from studio_core.imaging.levels import find_levels
 from studio_core.imaging.response import solve_response
