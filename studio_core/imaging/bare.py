@@ -21,6 +21,8 @@ _SCAN_END = re.compile(rb"\xff+[^\x00\xff\xd0-\xd7]", re.DOTALL)
 _MARKER = re.compile(rb"\xff+[^\x00\xff]", re.DOTALL)
 _ALONE = {0x01, *range(0xD0, 0xD9)}  # markers that nothing follows
 _END, _SCAN, _COMMENT = 0xD9, 0xDA, 0xFE
+_LAST = b"\xff\xd9"
+_SEQUENTIAL = (0xC0, 0xC1)
 _PNG_KEPT = {b"tRNS", b"gAMA", b"cHRM", b"sRGB", b"iCCP", b"cICP", b"sBIT"}
 
 
@@ -35,7 +37,8 @@ class Bare:
 def strip(data: bytes) -> Bare | None:
     """The bare file of a JPEG or PNG file; None for other files and where no picture is in it.
 
-    Its pixels are the same, bit for bit. A JPEG file that lacks nothing but its end gets one.
+    Its pixels are the same, bit for bit. A JPEG file of a single scan that lacks nothing but its end gets
+    one; in one of several scans nobody could tell what else is missing.
     """
     if data.startswith(JPEG):
         return _jpeg(data)
@@ -54,9 +57,16 @@ def exif_of(data: bytes) -> bytes:
 
 def _jpeg(data: bytes) -> Bare | None:
     kept: list[bytes] = []
-    exif, scans = b"", 0
+    exif, components, end = b"", b"", b""
+    scans, single = 0, False
     for marker, segment in _segments(data):
+        if marker == _END:
+            end = segment
+            break
         scans += marker == _SCAN
+        if marker in _SEQUENTIAL:
+            components = segment[9:10]
+        single = single or (marker == _SCAN and scans == 1 and segment[4:5] == components != b"")
         if marker == 0xE1 and segment[4:10] == b"Exif\0\0":
             exif = exif or segment[10:]
         elif marker == 0xE0 and segment[4:9] == b"JFIF\0" and len(segment) >= 18:
@@ -73,15 +83,16 @@ def _jpeg(data: bytes) -> Bare | None:
     if turn != 1:
         block = b"Exif\0\0" + orientation_block(turn)
         kept.insert(0, b"\xff\xe1" + struct.pack(">H", len(block) + 2) + block)
-    return Bare(JPEG + b"".join(kept) + b"\xff\xd9", exif)
+    return Bare(JPEG + b"".join(kept) + (_LAST if single else end), exif)
 
 
 def _segments(data: bytes) -> Iterator[tuple[int, bytes]]:
-    """Marker and bytes of each segment before the first end; a scan's segment holds the scan too."""
+    """Marker and bytes of each segment to the first end; a scan's segment holds the scan too."""
     at = 2
     while found := _MARKER.search(data, at):
         marker, at = found[0][-1], found.end()
         if marker == _END:
+            yield marker, _LAST
             return
         if marker in _ALONE:
             continue

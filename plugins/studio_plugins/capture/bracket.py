@@ -24,11 +24,12 @@ from studio_core.capturing.settings import (
 from studio_core.errors import InputError
 from studio_core.imaging.photograph import Photograph
 from studio_core.shading.job import Job
-from studio_plugins.capture.bracket_exposures import Exposed, completed, listed_exposures
+from studio_plugins.capture.bracket_exposures import Exposed, completed, joined, listed_exposures
 from studio_plugins.capture.bracket_looks import Look, dark_ends, goes_round, look_at, two_discs, well_exposed
 from studio_plugins.capture.bracket_sides import Member, in_order, part
 from studio_plugins.capture.bracket_turns import turned_back
 
+_BEST = ("8 bit", "16 bit", "linear")
 _WIDE = (1.6, 2.4)  # aspects in which two circles may lie side by side
 _TWICE_AS_WIDE = (1.98, 2.02)
 
@@ -71,8 +72,9 @@ def arrange(photographs: Sequence[Photograph], settings: BracketSettings, job: J
             notes.append(f"The {side} has one exposure only: what is clipped or black in it stays so.")
     if settings.layout in (AUTOMATIC, TWO_PICTURES) and layout == SINGLE:
         notes.append("There is one view only: what lies behind the lens was not photographed.")
-    for group in groups.values():
-        notes += [f"{t.name}: {note}" for t in group for note in t.photograph.notes]
+    told = [(note, t.name) for group in groups.values() for t in group for note in t.photograph.notes]
+    for note in dict.fromkeys(note for note, _ in told):
+        notes.append(f"{joined([name for said, name in told if said == note])}: {note}")
     return Brackets(layout, frozen_map(made), tuple(notes))
 
 
@@ -155,31 +157,53 @@ def _sides(taken: Sequence[_Taken], layout: str, chosen: bool, notes: list[str])
 
 
 def _consistent(groups: dict[str, list[_Taken]], notes: list[str]) -> dict[str, list[_Taken]]:
-    """Of each side the largest group of one size, all of one kind of numbers."""
+    """Of each side the largest group of one size; all of one kind of numbers and of one colour space.
+
+    Of equally many the linear ones are taken: cameras write raw files beside their JPEGs.
+    """
     everything = [t for group in groups.values() for t in group]
     kinds = [t.photograph.kind for t in everything]
-    kind = max(dict.fromkeys(kinds), key=kinds.count)
+    kind = max(dict.fromkeys(kinds), key=lambda k: (kinds.count(k), _BEST.index(k)))
+    others = [t for t in everything if t.photograph.kind != kind]
+    for other in dict.fromkeys(t.photograph.kind for t in others):
+        odd = [t for t in others if t.photograph.kind == other]
+        notes.append(_left_out(odd, f"{_are(odd)} {_numbers(other)} while the others are {_numbers(kind)}"))
+    colours = [_colour(t) for t in everything if t.photograph.kind == kind]
+    colour = max(dict.fromkeys(colours), key=colours.count)
+    odd = [t for t in everything if t.photograph.kind == kind and _colour(t) != colour]
+    if odd:
+        notes.append(_left_out(odd, f"{_have(odd)} another colour space than the others"))
     made: dict[str, list[_Taken]] = {}
     for side, group in groups.items():
-        alike = [t for t in group if t.photograph.kind == kind]
-        for t in group:
-            if t.photograph.kind != kind:
-                others = "linear light" if kind == "linear" else f"of {kind}"
-                notes.append(f"{t.name} is {_kind(t)} while the others are {others}; it is left out.")
+        alike = [t for t in group if t.photograph.kind == kind and _colour(t) == colour]
         sizes = [t.photograph.size for t in alike]
         if not sizes:
             continue
         size = max(dict.fromkeys(sizes), key=lambda s: (sizes.count(s), s[0] * s[1]))
-        for t in alike:
-            if t.photograph.size != size:
-                (w, h), (width, height) = t.photograph.size, size
-                notes.append(
-                    f"{t.name} has {w} × {h} pixels while the others of the {side} have {width} × {height};"
-                    " it is left out."
-                )
+        for other_size in dict.fromkeys(s for s in sizes if s != size):
+            odd = [t for t in alike if t.photograph.size == other_size]
+            (w, h), (width, height) = other_size, size
+            than = f"while the others of the {side} have {width} × {height}"
+            notes.append(_left_out(odd, f"{_have(odd)} {w} × {h} pixels {than}"))
         made[side] = [t for t in alike if t.photograph.size == size]
     return made if FRONT in made else {FRONT: made[BACK]}
 
 
-def _kind(taken: _Taken) -> str:
-    return "linear light" if taken.photograph.kind == "linear" else f"of {taken.photograph.kind}"
+def _colour(taken: _Taken) -> tuple[float, ...]:
+    return tuple(round(v, 2) for v in taken.photograph.colour)
+
+
+def _numbers(kind: str) -> str:
+    return "linear light" if kind == "linear" else f"of {kind}"
+
+
+def _left_out(odd: Sequence[_Taken], why: str) -> str:
+    return f"{joined([t.name for t in odd])} {why}; {'it is' if len(odd) == 1 else 'they are'} left out."
+
+
+def _are(odd: Sequence[_Taken]) -> str:
+    return "is" if len(odd) == 1 else "are"
+
+
+def _have(odd: Sequence[_Taken]) -> str:
+    return "has" if len(odd) == 1 else "have"

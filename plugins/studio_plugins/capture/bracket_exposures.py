@@ -91,7 +91,7 @@ def _side(
     if known and not same:
         names = [s.facts.name for s, ev in zip(shots, evs, strict=True) if ev is None]
         notes.append(
-            f"{_joined(names)} {_do(names)} not tell the exposure; it is guessed from the brightness."
+            f"{joined(names)} {_do(names)} not tell the exposure; it is guessed from the brightness."
         )
         filled = [ev if ev is not None else _guess(b, evs, bright) for ev, b in zip(evs, bright, strict=True)]
         return _TOLD, (filled, [ev is not None for ev in evs], notes)
@@ -131,7 +131,8 @@ def _guess(brightness: float, evs: Sequence[float | None], bright: Sequence[floa
     return float(np.interp(brightness, at, value))
 
 
-def _joined(names: Sequence[str]) -> str:
+def joined(names: Sequence[str]) -> str:
+    """Names in a sentence."""
     return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
 
 

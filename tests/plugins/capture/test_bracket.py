@@ -207,6 +207,27 @@ def test_sizes_that_differ_leave_the_largest_group() -> None:
     assert brackets.notes == ("deep.png is of 16 bit while the others are of 8 bit; it is left out.",)
 
 
+def test_raw_files_are_taken_before_the_jpegs_beside_them() -> None:
+    shots = heap((0, -2, 2), ())
+    raw = []
+    for shot in shots:
+        facts = replace(shot.facts, name=shot.facts.name.replace("jpg", "dng"))
+        light = (shot.pixels / 255.0).astype(np.float32) ** 2.2
+        raw.append(Photograph(light, facts, f"raw {shot.digest}"))
+    brackets = arrange([*shots, *raw], BracketSettings(layout=SINGLE))
+    assert {s.kind for s in brackets.sides[FRONT].shots} == {"linear"}
+    told = "are of 8 bit while the others are linear light; they are left out."
+    assert brackets.notes == (f"IMG_8.jpg, IMG_9.jpg and IMG_10.jpg {told}",)
+
+
+def test_other_primaries_are_left_out_and_named() -> None:
+    shots = heap((0, -2, 2), ())
+    shots[1] = replace(shots[1], colour=(1.22, -0.22, 0.0, -0.04, 1.04, 0.0, -0.02, -0.08, 1.1))
+    brackets = arrange(shots, BracketSettings(layout=SINGLE))
+    assert names(brackets, FRONT) == ["IMG_8.jpg", "IMG_10.jpg"]
+    assert brackets.notes == ("IMG_9.jpg has another colour space than the others; it is left out.",)
+
+
 def test_a_photograph_of_something_else_is_left_out() -> None:
     shots = heap()
     stray = photograph(scene(9), 0, "IMG_99.jpg", taken=140.0)
@@ -327,7 +348,7 @@ def test_nothing_to_work_with_is_said_in_a_sentence() -> None:
 def test_photographs_notes_are_passed_on_with_their_names() -> None:
     shots = [replace(s, notes=("It is in shades of grey.",)) for s in heap((0, 2), ())]
     notes = arrange(shots, BracketSettings(layout=SINGLE)).notes
-    assert notes == ("IMG_8.jpg: It is in shades of grey.", "IMG_9.jpg: It is in shades of grey.")
+    assert notes == ("IMG_8.jpg and IMG_9.jpg: It is in shades of grey.",)
 
 
 def test_linear_photographs_are_looked_at_too() -> None:

@@ -140,7 +140,10 @@ def test_small_faults_of_cameras_are_passed_over_and_damage_is_not(decoder: Imag
     odd[scan + 12] = 0  # what some phones write: the end of the spectrum of a sequential picture
     for harmless in (bytes(odd), data[:scan] + b"\0\0\0" + data[scan:], data[:-2], data + b"\0" * 500):
         np.testing.assert_array_equal(read_photograph(harmless, "a.jpg", decoder).pixels, sound)
-    for harm in (data[: len(data) // 2], data[: scan + 40], data[:scan], data[:30]):
+    many = encoded(picture(200, 300), progressive=True)
+    scans = [place for place in range(len(many)) if many[place : place + 2] == b"\xff\xda"]
+    cut = [many[: scans[-1]], many[: scans[2]], many[: len(many) * 2 // 3]]
+    for harm in (*cut, data[: len(data) // 2], data[: scan + 40], data[:scan], data[:30]):
         with pytest.raises(InputError, match=r"^a\.jpg cannot be read: it is damaged or incomplete \("):
             read_photograph(harm, "a.jpg", decoder)
 
