@@ -171,6 +171,7 @@ class Answers:
     compact_: bool = True
     import_: Callable[[ImportQuestion], ImportChoice | None] = staticmethod(lambda question: question.guess)
     photograph_: bool = True
+    capture_: bool = True
     files: list[Path] = field(default_factory=list)
     target: Path | None = None
     asked: list[str] = field(default_factory=list)
@@ -216,6 +217,10 @@ class Answers:
     def photograph(self, name: str) -> bool:
         self.asked.append(name)
         return self.photograph_
+
+    def capture(self, count: int) -> bool:
+        self.asked.append(f"capture {count}")
+        return self.capture_
 
     def open_files(self, title: str, filters: Sequence[Filter], *, many: bool = False) -> list[Path]:
         return self.files

@@ -71,6 +71,10 @@ class Ask(Protocol):
         """Whether an ordinary picture that reaches all around is to light the scene."""
         ...
 
+    def capture(self, count: int) -> bool:
+        """Whether so many photographs are those of a room, whose light they are to become."""
+        ...
+
     def open_files(self, title: str, filters: Sequence[Filter], *, many: bool = False) -> list[Path]:
         """Files to read."""
         ...

@@ -115,6 +115,22 @@ class Dialogs:
         box.exec()
         return box.clickedButton() is use
 
+    def capture(self, count: int) -> bool:
+        """Whether these are a room's photographs."""
+        box = QMessageBox(self._parent)
+        box.setIcon(QMessageBox.Icon.Question)
+        box.setWindowTitle("Capture a room's light")
+        box.setText(f"Capture the room's light from {count} photograph{'s' * (count > 1)}?")
+        box.setInformativeText(
+            "They should show one room at several exposures: to the front and to the back through a fisheye, "
+            "or all around. The project keeps them without their position."
+        )
+        use = box.addButton("Capture", QMessageBox.ButtonRole.AcceptRole)
+        box.addButton(QMessageBox.StandardButton.Cancel)
+        box.setDefaultButton(use)
+        box.exec()
+        return box.clickedButton() is use
+
     def open_files(self, title: str, filters: Sequence[Filter], *, many: bool = False) -> list[Path]:
         """Files to read."""
         text = ";;".join([*(f.text() for f in filters), "All files (*)"])

@@ -15,7 +15,7 @@ from studio_ui.settings import Settings
 
 _VERSION = 1  # stored layouts of another number are left alone
 THIRD_PARTY = "plugin-"  # how the ids of plugins' panels begin
-_HIDDEN = ("console",)  # at first, and what plugins bring
+_HIDDEN = ("console", "capture")  # at first, and what plugins bring
 _TABS = (("history", "cameras", "jobs", "log"), ("properties", "materials", "lighting", "shading"))
 
 

@@ -16,6 +16,8 @@ from studio_ui.ask import Ask
 from studio_ui.canvas.choice import CanvasChoice
 from studio_ui.canvas.switch_viewport import SwitchViewport
 from studio_ui.canvas.tools import CanvasTools
+from studio_ui.capture.feature import CaptureFeature
+from studio_ui.capture.panel import CapturePanel
 from studio_ui.context import Context
 from studio_ui.dialogs import Dialogs
 from studio_ui.features import Feature, gather
@@ -102,7 +104,9 @@ class MainWindow(QMainWindow):
         self.following = Following(self, context, viewport, self.status, self.files)
         features = self._features()
         load = self.transfer.load_environment
-        self.drops = Drops(self, context, viewport, self.ask, self.files, self.importing, load)
+        self.drops = Drops(
+            self, context, viewport, self.ask, self.files, self.importing, load, self.capture.take
+        )
         room = FirstRoom(context, self.rooms.add, self.viewing.frame_all, self._samples)
         over = self.drops.overlay
         self.front = Front(context, viewport.widget, self.files, self._samples, load, over, room.begin)
@@ -162,6 +166,7 @@ class MainWindow(QMainWindow):
         self.layout_ = Layout(self, settings, self._panels())
         self.layouts = Layouts(self.layout_, settings, self.ask)
         self.panels, self.docks = self.layout_.panels, self.layout_.docks
+        self.capture = CaptureFeature(context, self.capture_panel, lambda: self.layout_.show("capture"))
         self.keyboard = Keyboard(self, lambda: viewport.inner.widget, self.docks)
         chosen = PreferencesFeature(
             self, self.preferences, self.shortcuts, context.tasks, user_cache() / "computed"
@@ -200,14 +205,20 @@ class MainWindow(QMainWindow):
             ConsoleDoor(self.panels["console"], self.docks["console"]),
             Help(self, context, settings, self.shortcuts, self.viewing.mouse),
             self.rooms,
+            self.capture,
         ]
 
     def _panels(self) -> list[tuple[Panel, Qt.DockWidgetArea]]:
         load, save = self.transfer.load_environment, self.files.save
         shelf = EnvironmentShelf(self.context, self.settings, self._samples, load)
         self.transfer.lit.connect(shelf.used)
-        seen = self.camera_pictures
-        return all_panels(self.context, shelf, load, self.ask, self.settings, save, self.cameras, seen)
+        self.capture_panel = CapturePanel(
+            self.context, self.ask, self.settings, self.files.beside, lambda: self.files.folder
+        )
+        seen, capture = self.camera_pictures, self.capture_panel
+        return all_panels(
+            self.context, shelf, load, self.ask, self.settings, save, self.cameras, seen, capture
+        )
 
     def handlers(self) -> dict[str, Callable[[], object]]:
         """By action id."""

@@ -56,12 +56,20 @@ class Tasks:
         *,
         quiet: bool = False,
         executor: Executor | None = None,
+        published: Callable[[Any], object] | None = None,
     ) -> Task:
         """Do `work(job)`; then `done(result)` here. Errors go to the journal, and to `failed`.
 
         `quiet` keeps it out of the jobs panel (autosave). What takes minutes brings its own `executor`.
+        `published(artifact)` is told, here, what the job publishes on its way.
         """
-        job = Job(label, on_progress=lambda _: self._post(self.changed.emit))
+
+        def tell(artifact: Any) -> None:
+            if published is not None:
+                self._post(lambda: published(artifact))
+
+        listens = tell if published is not None else None
+        job = Job(label, lambda _: self._post(self.changed.emit), listens)
         task = Task(job)
         if not quiet:
             self.running.append(task)

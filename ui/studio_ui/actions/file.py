@@ -21,6 +21,8 @@ ITEMS: tuple[Item, ...] = (
                "Ask about unit, axis and place of every model"),
     ActionSpec("file.environment", "Load environment…", "File", "", "Light from an HDR picture",
                icon="environment"),
+    ActionSpec("file.capture", "Capture a room's light…", "File", "",
+               "From photographs of a room at several exposures, front and back", icon="capture"),
     SEPARATOR,
     ActionSpec("file.export_picture", "Export picture…", "File", "Ctrl+E",
                "In any size, for the screen or for print", icon="picture", enabled="picture"),

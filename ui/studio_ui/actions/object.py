@@ -76,6 +76,8 @@ ITEMS: tuple[Item, ...] = (
                "Make an import larger or smaller that had another unit, or turn it upright",
                enabled="correctable"),
     SEPARATOR,
+    ActionSpec("object.edit_capture", "Edit capture…", "Object", "",
+               "The photographs and decisions that the environment was made from", enabled="captured"),
     ActionSpec("room.new", "New room", "Object/Room", "",
                "Floor, walls and ceiling round the furniture, with a window and a door", icon="room"),
     ActionSpec("room.open_walls", "Open walls towards the view", "Object/Room", "",

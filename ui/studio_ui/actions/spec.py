@@ -50,6 +50,7 @@ REASONS = {
     **{f"camera_{n}": "There are fewer cameras" for n in range(1, 10)},
     "group": "No group is chosen",
     "room": "There is no room",
+    "captured": "Neither a capture nor an environment made by one is chosen",
     "savable": "Nothing has changed since it was saved",
     "correctable": "No object is chosen",
     "has_file": "The project is in no file yet",

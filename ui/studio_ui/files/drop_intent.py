@@ -13,24 +13,34 @@ from studio_ui.files.project_files import SUFFIX
 from studio_ui.objects.material_drag import MIME
 
 HDR = (".exr", ".hdr", ".tif", ".tiff")
+CAMERAS = (
+    *(".heic", ".heif", ".hif"),
+    *(".dng", ".nef", ".nrw", ".cr2", ".cr3", ".arw", ".raf", ".rw2", ".orf", ".pef", ".srw"),
+)
+"""Files of cameras that are photographs of a room and nothing else."""
 PHOTOGRAPHS = (".png", ".jpg", ".jpeg", ".webp", ".bmp")
 _TWICE = 0.02  # how far from 2:1 the sides of an equirectangular picture may be
 
 
 @dataclass(frozen=True)
 class Intent:
-    """What happens; `problem` says why nothing does. `photograph` is asked about first."""
+    """What happens; `problem` says why nothing does. `photograph` and `capture` are asked about first."""
 
     project: Path | None = None
     models: tuple[Path, ...] = ()
     light: Path | None = None
     photograph: bool = False
     material: bool = False
+    capture: tuple[Path, ...] = ()
     problem: str = ""
 
     def __bool__(self) -> bool:
         return not self.problem and (
-            self.project is not None or bool(self.models) or self.light is not None or self.material
+            self.project is not None
+            or bool(self.models)
+            or self.light is not None
+            or self.material
+            or bool(self.capture)
         )
 
     def told(self, *, here: bool, options: bool) -> str:
@@ -39,6 +49,8 @@ class Intent:
             return self.problem
         if self.project is not None:
             return f"Open {self.project.stem}"
+        if self.capture:
+            return f"Capture the room's light from {len(self.capture)} photographs"
         parts = []
         if self.models:
             what = self.models[0].stem if len(self.models) == 1 else f"{len(self.models)} models"
@@ -83,12 +95,14 @@ def intent_of(paths: Sequence[Path], known: Collection[str]) -> Intent:
             if len(paths) > 1:
                 return Intent(problem="A project is dropped by itself.")
             return Intent(project=path)
-        if ending in HDR or ending in PHOTOGRAPHS:
+        if ending in HDR or ending in PHOTOGRAPHS or ending in CAMERAS:
             lights.append(path)
         elif not known or ending in known:
             models.append(path)
         else:
             return Intent(problem=f"{path.name} is no model, picture of light or project that can be read.")
+    if lights and not models and _photographs(lights):
+        return Intent(capture=tuple(lights))
     if len(lights) > 1:
         return Intent(problem="One picture of light is dropped at a time.")
     if lights and lights[0].suffix.lower() in PHOTOGRAPHS:
@@ -97,6 +111,14 @@ def intent_of(paths: Sequence[Path], known: Collection[str]) -> Intent:
             return Intent(problem=problem)
         return Intent(models=tuple(models), light=lights[0], photograph=True)
     return Intent(models=tuple(models), light=lights[0] if lights else None)
+
+
+def _photographs(paths: Sequence[Path]) -> bool:
+    """Whether files are a series of photographs rather than one picture of light."""
+    endings = {path.suffix.lower() for path in paths}
+    if endings & set(CAMERAS):
+        return True
+    return len(paths) > 1 and endings <= {*PHOTOGRAPHS, ".tif", ".tiff"}
 
 
 def _unusable(path: Path) -> str:

@@ -32,11 +32,13 @@ class Drops(QObject):
         files: ProjectFiles,
         importing: Importing,
         load_environment: Callable[[Path], object],
+        capture: Callable[[Sequence[Path]], object],
     ) -> None:
         super().__init__(window)
         self.overlay = DropOverlay()
         self._window, self._context, self._viewport, self._ask = window, context, viewport, ask
         self._files, self._importing, self._load = files, importing, load_environment
+        self._capture = capture
         self._intent: Intent | None = None
         window.setAcceptDrops(True)
         window.installEventFilter(self)
@@ -114,6 +116,8 @@ class Drops(QObject):
         if meant.project is not None:
             self._files.open(meant.project)
             return
+        if meant.capture and self._ask.capture(len(meant.capture)):
+            self._capture(meant.capture)
         if meant.light is not None and (not meant.photograph or self._ask.photograph(meant.light.name)):
             self._load(meant.light)
         if meant.models:

@@ -79,6 +79,11 @@ class ProjectFiles:
         """By name."""
         return {"savable": lambda: self.modified or self.path is None}
 
+    @property
+    def folder(self) -> Path | None:
+        """Where the project lies."""
+        return self.path.parent if self.path is not None else None
+
     def beside(self, suffix: str) -> Path:
         """A file of that suffix beside the project, to suggest for exports."""
         return (self.path.parent if self.path else Path.home()) / f"{self.name}{suffix}"

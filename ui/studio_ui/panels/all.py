@@ -7,6 +7,7 @@ from collections.abc import Callable
 from PySide6.QtCore import Qt
 
 from studio_ui.ask import Ask
+from studio_ui.capture.panel import CapturePanel
 from studio_ui.context import Context
 from studio_ui.panels.cameras import CamerasPanel
 from studio_ui.panels.console import ConsolePanel
@@ -35,6 +36,7 @@ def all_panels(
     save: Callable[[], object],
     cameras: Cameras,
     pictures: CameraPictures,
+    capture: CapturePanel,
 ) -> list[tuple[Panel, Qt.DockWidgetArea]]:
     """The panels in the order of the Window menu; tabs are in `layout`."""
     left, right = Qt.DockWidgetArea.LeftDockWidgetArea, Qt.DockWidgetArea.RightDockWidgetArea
@@ -50,5 +52,6 @@ def all_panels(
         (LightingPanel(context, shelf, load_environment, ask.folder), right),
         (ShadingPanel(context), right),
         (ConsolePanel(context, ask, settings, save), below),
+        (capture, right),
         *((panel, right) for panel in plugin_panels(context)),
     ]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from studio_core.scene.capture import Capture
 from studio_core.scene.nodes import (
     AreaLamp,
     Camera,
@@ -22,6 +23,7 @@ KINDS: dict[type[Node], tuple[str, str, str]] = {
     Room: ("room", "Room", "rooms"),
     Camera: ("camera", "Camera", "cameras"),
     Environment: ("environment", "Environment", "environments"),
+    Capture: ("capture", "Capture", "captures"),
     PointLamp: ("lamp", "Point lamp", "point lamps"),
     SpotLamp: ("spot", "Spot lamp", "spot lamps"),
     DirectionalLamp: ("sun", "Sun", "suns"),

@@ -32,6 +32,7 @@ from studio_ui.panels.panel import Panel, row
 _VERBS = {"hidden": ("Show", "Hide"), "locked": ("Unlock", "Lock")}
 _MENU = (
     ("view.frame_selection",),
+    ("object.edit_capture",),
     ("object.group", "object.ungroup", "edit.duplicate", "edit.delete"),
     ("edit.select_material", "edit.select_instances"),
 )

@@ -9,6 +9,7 @@ from PySide6.QtCore import QAbstractItemModel, QMimeData, QModelIndex, QPersiste
 from PySide6.QtGui import QColor, QIcon
 
 from studio_core.edits import Compound, Edit, Order, Reparent, SetFields
+from studio_core.scene.capture import Capture
 from studio_core.scene.diff import Aspect, Changes
 from studio_core.scene.nodes import Camera, Environment, Node, NodeId, Scene
 from studio_ui.editing import Editing
@@ -228,12 +229,12 @@ class OutlinerModel(QAbstractItemModel):
         return self._editing.apply(SetFields(node, {"name": name}, f"Rename {self._scene[node].name}"))
 
     def flags(self, index: Index) -> Qt.ItemFlag:
-        """Names can be edited and dragged; cameras and environments hold nothing."""
+        """Names can be edited and dragged; cameras, captures and environments hold nothing."""
         if not index.isValid():
             return Qt.ItemFlag.ItemIsDropEnabled
         made = Qt.ItemFlag.ItemIsEnabled | Qt.ItemFlag.ItemIsSelectable
         node = self._scene.nodes.get(self.node(index) or "")
-        if not isinstance(node, Camera | Environment):
+        if not isinstance(node, Camera | Capture | Environment):
             made |= Qt.ItemFlag.ItemIsDropEnabled
         if index.column() == NAME:
             made |= Qt.ItemFlag.ItemIsEditable | Qt.ItemFlag.ItemIsDragEnabled

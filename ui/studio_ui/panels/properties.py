@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from PySide6.QtCore import QSignalBlocker, QTimer
-from PySide6.QtWidgets import QWidget
+from PySide6.QtGui import QAction
+from PySide6.QtWidgets import QPushButton, QWidget
 
 from studio_core.edits import Assign, Compound
 from studio_core.params import ParamInfo, param_infos
+from studio_core.scene.capture import Capture
 from studio_core.scene.diff import Changes
 from studio_core.scene.nodes import Environment, MaterialId, MeshObject, Node, NodeId, Scene
 from studio_core.scene.room import SLOTS, Room
+from studio_ui.capture.feature import capture_behind
 from studio_ui.context import Context
 from studio_ui.forms.fields import Combo
 from studio_ui.forms.node_sink import NodeSink
@@ -36,9 +41,11 @@ class PropertiesPanel(Panel):
         self.nodes: tuple[NodeId, ...] = ()
         self._sink = NodeSink(context, lambda: self.nodes)
         self.form: NodeForm | None = None
+        self._actions: Mapping[str, QAction] = {}
         self.flags: ParamForm | None = None
         self.place: PlaceEditor | None = None
         self.room: RoomForm | None = None
+        self.edit_capture: QPushButton | None = None
         self.slots: list[Combo] = []
         self._built: object = self
         self._column = self.scroller()
@@ -51,6 +58,10 @@ class PropertiesPanel(Panel):
         )
         self.refresh()
 
+    def use_actions(self, actions: Mapping[str, QAction]) -> None:
+        """Some things have one of their own here."""
+        self._actions = actions
+
     def refresh(self) -> None:
         """Show what is chosen as it is now."""
         scene = self.context.document.scene
@@ -61,7 +72,8 @@ class PropertiesPanel(Panel):
         slots = len(meshes[0].materials) if meshes else 0
         if len({len(mesh.materials) for mesh in meshes}) > 1:
             slots = 1  # one for all
-        key = (self.nodes, tuple(type(node) for node in nodes), slots, known if slots else ())
+        captured = len(nodes) == 1 and capture_behind(scene, nodes[0].id) is not None
+        key = (self.nodes, tuple(type(node) for node in nodes), slots, known if slots else (), captured)
         if key != self._built:
             self._built = key
             self._build(scene, nodes, slots)
@@ -75,7 +87,7 @@ class PropertiesPanel(Panel):
     def _build(self, scene: Scene, nodes: list[Node], slots: int) -> None:
         self._sink.commit()
         clear(self._column)
-        self.form = self.flags = self.place = self.room = None
+        self.form = self.flags = self.place = self.room = self.edit_capture = None
         self.slots = []
         if not nodes:
             self._column.addWidget(note("Click something in the picture or the outliner to see what it is."))
@@ -90,7 +102,10 @@ class PropertiesPanel(Panel):
         if len(nodes) == 1 and isinstance(nodes[0], Room):
             self.room = RoomForm(self.context.editing)
             self._column.addWidget(self.room)
-        if not any(isinstance(node, Environment) for node in nodes):
+        if len(nodes) == 1 and capture_behind(scene, nodes[0].id) is not None:
+            self.edit_capture = self._capture_button()
+            self._column.addWidget(self.edit_capture)
+        if not any(isinstance(node, Capture | Environment) for node in nodes):
             self._column.addWidget(heading("Place"))
             self.place = PlaceEditor(self.context)
             self._column.addWidget(self.place)
@@ -100,6 +115,14 @@ class PropertiesPanel(Panel):
         self.flags = ParamForm({name: infos[name] for name in _FLAGS}, self._sink)
         self._column.addWidget(self.flags)
         self._column.addStretch(1)
+
+    def _capture_button(self) -> QPushButton:
+        button = QPushButton("Edit capture…")
+        button.setToolTip("The photographs and decisions that the light was made from")
+        action = self._actions.get("object.edit_capture")
+        if action is not None:
+            button.clicked.connect(action.trigger)
+        return button
 
     def _materials(self, scene: Scene, nodes: list[Node], slots: int) -> QWidget:
         box = QWidget()
