@@ -9,13 +9,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from studio_core.capturing.artifacts import F32, F64, Mask, Registration, Stitched, View
-from studio_core.capturing.settings import BACK, FRONT, StitchSettings
+from studio_core.capturing.settings import BACK, FEATHER, FRONT, StitchSettings
+from studio_core.errors import InputError
 from studio_core.imaging.latlong import direction_to_uv, equirect_direction
+from studio_core.imaging.resample import resize_area
 from studio_core.imaging.sphere import with_border
 from studio_core.parallel import Workers
 from studio_core.shading.job import Job
 from studio_plugins.capture.fill import fill
-from studio_plugins.capture.level import find_level
+from studio_plugins.capture.level import Level, find_level
 from studio_plugins.capture.sampling import COARSE, Seen, Source, harshness, lens_source, look_through
 from studio_plugins.capture.seam import Joint, join
 
@@ -24,6 +26,7 @@ HALF_TURN = np.diag([-1.0, 1.0, -1.0])
 _TILE = (128, 256)
 _BORDER = 4
 _LEVEL_WIDTH = 2048
+_NOT_QUITE = 0.04
 
 
 def stitch(
@@ -32,30 +35,30 @@ def stitch(
     settings: StitchSettings,
     job: Job,
     workers: Workers | None = None,
+    upright: Level | None = None,
 ) -> Stitched:
     """The finished picture's light from one lens or two, before calibration.
 
     `views`: by side; with both there must be a `registration`, whose lens, circles, falloff and gain count (a
     registration of a single lens counts for its lens and falloff). What no lens sees is filled with the
-    light of its surroundings and marked. Raises ValueError without views, Cancelled.
+    light of its surroundings and marked. `upright`: what `level_of` found for these views, where it is known
+    already (it does not depend on the settings). Raises ValueError without views, Cancelled.
     """
-    if not views:
-        raise ValueError("there is nothing to join")
+    if settings.level and upright is None:
+        upright = level_of(views, registration, job, workers)
     lenses = _lenses(views, registration, 2 * np.pi / settings.width)
-    base, levelled, notes = HALF_TURN, None, list[str]()
-    if settings.level:
-        width = min(settings.width, _LEVEL_WIDTH)
-        draft = _compose(lenses, StitchSettings(width=width, blend="feather"), HALF_TURN, job, workers)
-        found = find_level(draft.light, ~draft.unseen)
-        if found.rotation is not None:
-            base, levelled = found.rotation @ HALF_TURN, found.tilt
-        notes.append(found.told)
-    upright = turned(settings) @ base
-    made = _compose(lenses, settings, upright, job, workers)
-    fill(made.light, made.unseen)
-    return Stitched(
-        made.light, made.clipped, made.unseen, made.share, upright, made.dark, levelled, tuple(notes)
-    )
+    return _finished(lenses, HALF_TURN, settings, upright, job, workers)
+
+
+def level_of(
+    views: Mapping[str, View], registration: Registration | None, job: Job, workers: Workers | None = None
+) -> Level:
+    """How far these views are off level, by the upright edges in a draft of their picture."""
+    finest = max((2 * np.pi * v.circle.radius / v.lens.half for v in views.values()), default=0)
+    draft = StitchSettings(width=int(np.clip(finest, 128, _LEVEL_WIDTH)), blend=FEATHER)
+    lenses = _lenses(views, registration, 2 * np.pi / draft.width)
+    made = _compose(lenses, draft, HALF_TURN, job, workers)
+    return find_level(made.light, ~made.unseen)
 
 
 def turned(settings: StitchSettings) -> F64:
@@ -76,30 +79,74 @@ def stitch_equirectangular(
     """The same for a picture that is equirectangular already: levelled, turned and resized.
 
     Unchanged, bit for bit, where nothing has to be done. Pixels that are not usable are filled. `view`'s
-    circle and lens do not matter. ValueError when it is not twice as wide as high.
+    circle and lens do not matter. A picture that is nearly twice as wide as high is taken for all of the
+    sphere; InputError for others.
     """
+    view = _two_to_one(view)
     height, width = view.light.shape[:2]
-    if width != 2 * height:
-        raise ValueError("an equirectangular picture is twice as wide as high")
-    base, levelled, notes = np.eye(3), None, list[str]()
+    found = None
     if settings.level:
         found = find_level(np.where(view.usable[..., None], view.light, np.float32(0)), view.usable)
-        if found.rotation is not None:
-            base, levelled = found.rotation, found.tilt
-        notes.append(found.told)
-    upright = turned(settings) @ base
-    if settings.width == width and np.array_equal(upright, np.eye(3)):
+    frame, tilt, notes = _frame(np.eye(3), settings, found)
+    if settings.width == width and np.array_equal(frame, np.eye(3)):
         none = np.zeros((height, width), np.bool_)
-        light, unseen = view.light.copy(), ~view.usable
-        clipped = none if view.clipped is None else view.clipped
-        made = _Composed(light, clipped, none if view.dark is None else view.dark, unseen, _ones(unseen))
-    else:
-        source = _picture_source(view, 2 * np.pi / settings.width)
-        made = _compose([_Lens(source, np.eye(3), None, np.ones(3))], settings, upright, job, workers)
+        clipped, dark = (none if mask is None else mask for mask in (view.clipped, view.dark))
+        share = view.usable.astype(np.float32)
+        made = _Composed(view.light.copy(), clipped, dark, ~view.usable, share)
+        return _stitched(made, frame, tilt, notes)
+    source = _picture_source(view, 2 * np.pi / settings.width)
+    whole = [_Lens(source, np.eye(3), None, np.ones(3))]
+    return _finished(whole, np.eye(3), settings, found, job, workers)
+
+
+def _two_to_one(view: View) -> View:
+    height, width = view.light.shape[:2]
+    if width == 2 * height:
+        return view
+    if abs(width / height - 2) > _NOT_QUITE:
+        raise InputError(
+            f"The picture cannot be taken for all directions: {width} × {height} is not twice as wide as high"
+        )
+    size = max(1, width // 2), 2 * max(1, width // 2)
+
+    def mask(given: Mask | None) -> Mask | None:
+        if given is None:
+            return None
+        made: Mask = resize_area(given[..., None].astype(np.float32), *size)[..., 0] > 0.5
+        return made
+
+    light = np.asarray(resize_area(view.light, *size), np.float32)
+    usable = mask(view.usable)
+    assert usable is not None
+    return View(light, usable, view.circle, view.lens, mask(view.clipped), mask(view.dark))
+
+
+def _finished(
+    lenses: list[_Lens],
+    base: F64,
+    settings: StitchSettings,
+    level: Level | None,
+    job: Job,
+    workers: Workers | None,
+) -> Stitched:
+    frame, tilt, notes = _frame(base, settings, level)
+    return _stitched(_compose(lenses, settings, frame, job, workers), frame, tilt, notes)
+
+
+def _frame(
+    base: F64, settings: StitchSettings, level: Level | None
+) -> tuple[F64, float | None, tuple[str, ...]]:
+    """The finished picture's frame from the lens', by how much it was levelled, and what is told."""
+    if not settings.level or level is None:
+        return turned(settings) @ base, None, ()
+    if level.rotation is None:
+        return turned(settings) @ base, None, (level.told,)
+    return turned(settings) @ level.rotation @ base, level.tilt, (level.told,)
+
+
+def _stitched(made: _Composed, frame: F64, tilt: float | None, notes: tuple[str, ...]) -> Stitched:
     fill(made.light, made.unseen)
-    return Stitched(
-        made.light, made.clipped, made.unseen, made.share, upright, made.dark, levelled, tuple(notes)
-    )
+    return Stitched(made.light, made.clipped, made.unseen, made.share, frame, made.dark, tilt, notes)
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,6 +180,8 @@ class _Composed:
 
 
 def _lenses(views: Mapping[str, View], registration: Registration | None, pitch: float) -> list[_Lens]:
+    if not views:
+        raise ValueError("there is nothing to join")
     if len(views) == 2 and registration is None:
         raise ValueError("how the two lenses stand to each other is not known")
     made = []
@@ -258,7 +307,3 @@ def _tile(
     made.unseen[place] = ~(front.seen | back.seen)
     made.clipped[place] = np.where(first, front.clipped, back.clipped)
     made.dark[place] = np.where(first, front.dark, back.dark)
-
-
-def _ones(mask: Mask) -> F32:
-    return np.ones(mask.shape, np.float32)

@@ -16,7 +16,7 @@ from studio_core.imaging.environment import load_environment
 from studio_core.imaging.projection import Circle, Lens
 from studio_core.shading.job import Job
 from studio_plugins.capture.level import find_level, great_circles, vertical
-from studio_plugins.capture.stitch import stitch, stitch_equirectangular, turned
+from studio_plugins.capture.stitch import level_of, stitch, stitch_equirectangular, turned
 
 
 def angle(a: np.ndarray, b: np.ndarray) -> float:
@@ -113,6 +113,9 @@ def test_a_stitched_room_is_levelled_and_what_is_turned_by_hand_comes_on_top() -
     np.testing.assert_allclose(
         by_hand.upright, turned(StitchSettings(pitch=10, roll=5)) @ made.upright, atol=1e-9
     )
+    known = level_of(views, None, Job("x"))
+    again = stitch(views, None, StitchSettings(width=512), Job("x"), upright=known)
+    np.testing.assert_array_equal(again.light, made.light)
     left = stitch(
         {"front": lens_view(smooth_sky, Lens(), HALF_TURN)}, None, StitchSettings(width=128), Job("x")
     )
