@@ -20,7 +20,7 @@ import numpy.typing as npt
 from studio.bench import capture_floor
 from studio.bench import capture_measure as measure
 from studio.bench.harness import Report
-from studio.bench.phone import Phone, Shots, clipped_share, shoot
+from studio.bench.phone import Phone, Shots, clipped_share, exposure_scale, lens_light, shoot
 from studio.bench.phone_random import random_phone
 from studio.headless import Headless
 from studio_core.capturing.artifacts import CaptureState
@@ -53,6 +53,8 @@ MAPS = {
     "KernerEnv": "third_party/openexr_env/KernerEnvLatLong.exr",
 }
 LADDERS = ((-2.0, 0.0, 2.0), (-4.0, -2.0, 0.0, 2.0, 4.0), (-6.0, -4.0, -2.0, 0.0, 2.0))
+FULL = 0.85
+"""Of the darkest exposure: lamps that are turned down fill so much of it."""
 COVERED = 0.005
 """Share of a room's energy beyond the darkest exposure, under which its range counts as captured."""
 
@@ -190,6 +192,7 @@ def _over_phones(
         drawn = random_phone(100 * index + seed, tuned=False, radius=setup.radius, reflections=True)
         drawn = replace(drawn, evs=ladder_of(room, drawn))
         shots: Shots | None = None
+        within = dimmed(room, drawn)
         for kind in wanted:
             case, wrong = CASES[kind], None
             phone = drawn if case.glare else replace(drawn, glare=0.0)
@@ -197,14 +200,19 @@ def _over_phones(
                 continue
             if case.wrong:
                 phone, *wrong = wrong_table(phone, seed)
-            if shots is None or shots.truth.phone != phone:
-                shots = shoot(room, phone, seed)
+            light = room if case.meter else within
+            if shots is None or case.meter or shots.truth.phone != phone:
+                shots = shoot(light, phone, seed)
             case_name = f"{name}/{kind}"
             with program.job(f"{case_name} {seed + 1}/{setup.phones}") as job:
-                state = _captured(program, case, shots, room, setup.width, job)
-            values = measured(state, shots, room, wrong)
+                before, state = _captured(program, case, shots, light, setup.width, job)
+            values = measured(state, shots, light, wrong)
+            if case.meter:
+                without = measured(before, shots, light)
+                values["irradiance_unmetered_rel_rmse"] = without["irradiance_rel_rmse"]
             if kind == "default":
-                values |= floor_of(shots, room, setup.width)
+                values |= {"dimmed_energy": 1 - _energy(within) / _energy(room)}
+                values |= floor_of(shots, light, setup.width)
             for metric, figure in values.items():
                 found.setdefault((case_name, metric), []).append(figure)
             told = {"phone": seed, "evs": list(phone.evs), **values, "notes": list(state.notes)}
@@ -215,22 +223,25 @@ def _over_phones(
     report.details.update(details)
 
 
-def _captured(program: Headless, case: Case, shots: Shots, room: F32, width: int, job: Job) -> CaptureState:
+def _captured(
+    program: Headless, case: Case, shots: Shots, room: F32, width: int, job: Job
+) -> tuple[CaptureState, CaptureState]:
+    """Without a light meter, and as the case has it."""
     capture = program.registry.get("capturer", CAPTURER).open(program.services)
     photographs = (*shots.front, *shots.back)
     settings = with_sides(settings_for(case, shots.truth.phone, width), shots)
     state: CaptureState = capture.run(photographs, settings, job)
-    if case.meter:
-        calibration = with_meter(room, shots, measure.finished_from_room(state, shots.truth))
-        state = capture.run(photographs, replace(settings, calibration=calibration), job)
-    return state
+    if not case.meter:
+        return state, state
+    calibration = with_meter(room, shots, measure.finished_from_room(state, shots.truth))
+    return state, capture.run(photographs, replace(settings, calibration=calibration), job)
 
 
 def with_meter(
     room: F32, shots: Shots, finished_from_room: npt.NDArray[np.float64], lux: float = 1000.0
 ) -> CalibrationSettings:
     """Two readings of a meter that faces what no exposure resolves: with that shaded, and `lux` with it."""
-    resolved = captured_light(room, shots)
+    resolved = dimmed(room, shots.truth.phone)
     clipped = np.any(room > resolved, axis=2)
     height, width = clipped.shape
     u, v = np.meshgrid((np.arange(width) + 0.5) / width, (np.arange(height) + 0.5) / height)
@@ -263,11 +274,9 @@ def measured(
     assert state.captured is not None
     turned = measure.finished_from_room(state, truth)
     made = state.captured.environment.pixels
-    limit = captured_light(room, shots)
-    pixels = measure.pixel_error(state, limit, truth, turned)
+    pixels = measure.pixel_error(state, room, truth, turned)
     values = {
-        "irradiance_rel_rmse": measure.irradiance_error(made, limit, turned),
-        "irradiance_whole_rel_rmse": measure.irradiance_error(made, room, turned),
+        "irradiance_rel_rmse": measure.irradiance_error(made, room, turned),
         "clipped_energy": truth.clipped,
         "pixel_log2_median": pixels.median,
         "pixel_log2_p95": pixels.p95,
@@ -298,16 +307,23 @@ def floor_of(shots: Shots, room: F32, width: int) -> dict[str, float]:
     }
 
 
-def captured_light(room: F32, shots: Shots) -> F32:
-    """The room as far as its range was captured: brighter light is what fills the darkest exposure."""
-    phone, truth = shots.truth.phone, shots.truth
-    darkest = min(phone.evs)
-    height, width = room.shape[:2]
-    u, v = np.meshgrid((np.arange(width) + 0.5) / width, (np.arange(height) + 0.5) / height)
-    in_front = -(equirect_direction(u, v) @ truth.room_from_front)[..., 2] > 0
-    ev = np.where(in_front, darkest, darkest + phone.back_ev)[:, :, None]
-    full = 1 / (truth.scale * 2.0**ev * np.array(phone.curve.gains))
-    return np.asarray(np.minimum(room, full), np.float32)
+def dimmed(room: F32, phone: Phone) -> F32:
+    """The room with its brightest lamps turned down to what the darkest exposure of both lenses resolves."""
+    part = 1 / 6
+    small = replace(
+        phone,
+        size=(max(round(phone.size[0] * part), 16), max(round(phone.size[1] * part), 16)),
+        circle=phone.circle.scaled(part),
+        arcs=(),
+        samples=1,
+    )
+    scale = exposure_scale(lens_light(room, small))
+    darkest = scale * 2.0 ** (min(phone.evs) + max(0.0, phone.back_ev)) * max(phone.curve.gains)
+    return np.minimum(room, np.float32(FULL / darkest))
+
+
+def _energy(light: F32) -> float:
+    return float((light * pixel_solid_angles(*light.shape[:2])[:, None, None]).sum())
 
 
 def _named(state: CaptureState, side: str, after: int) -> bool:

@@ -182,7 +182,7 @@ def shoot(environment: F32, phone: Phone, seed: int = 0) -> Shots:
     truth = lens_light(environment, phone, seed)
     room, poses = _placed(environment, phone, seed)
     reference = len(phone.evs) // 2
-    scale = phone.key / max(_middle(truth), 1e-12)
+    scale = exposure_scale(truth)
     shots: dict[str, tuple[Photograph, ...]] = {}
     sides: dict[str, SideTruth] = {}
     for place, side in enumerate(SIDES):
@@ -268,9 +268,10 @@ def _with_glare(phone: Phone, rays: Rays, light: F32) -> F32:
     return np.asarray(made, np.float32)
 
 
-def _middle(truth: Truth) -> float:
+def exposure_scale(truth: Truth) -> float:
+    """Exposure of light 1 at EV 0: the front view's median then is the phone's `key`."""
     light = truth.front.light.mean(axis=2)
-    return float(np.median(light[truth.view(FRONT).usable]))
+    return truth.phone.key / max(float(np.median(light[truth.view(FRONT).usable])), 1e-12)
 
 
 def _hand(phone: Phone, rng: np.random.Generator, reference: int) -> tuple[F64, ...]:

@@ -144,14 +144,20 @@ def test_the_angle_between_turns(yaw: float, pitch: float, degrees: float) -> No
     assert capture_measure.angle_between(a, a @ turn(degrees, 0, 0)) == pytest.approx(degrees, abs=1e-5)
 
 
-def test_light_beyond_the_darkest_exposure_is_not_asked_for() -> None:
+def test_lamps_are_turned_down_to_what_the_darkest_exposure_resolves() -> None:
     bright = room()
     bright[20:22, 60:62] = 5000
-    shots = shoot(bright, PHONE, 1)
-    limit = capture.captured_light(bright, shots)
-    assert limit.max() < 100
-    assert (limit == bright).mean() > 0.99
-    assert shots.truth.clipped > 0.1
+    assert shoot(bright, PHONE, 1).truth.clipped > 0.1
+    for phone in (
+        PHONE,
+        replace(PHONE, back_ev=0.8, falloff=0.5),
+        replace(PHONE, curve=Curve("per channel")),
+    ):
+        within = capture.dimmed(bright, phone)
+        assert (within == bright).mean() > 0.99
+        shots = shoot(within, replace(phone, full_well=1e9, read_noise=0), 1)
+        assert shots.truth.clipped == 0
+        assert 150 < max(side[0].pixels.max() for side in (shots.front, shots.back)) < 255
     assert capture.ladder_of(bright, PHONE) == capture.LADDERS[-1]
     assert capture.ladder_of(room(), PHONE) == capture.LADDERS[0]
 
