@@ -27,8 +27,9 @@ _SHORTEST = 24  # pixels of a cut
 _NEAR = math.radians(1.2)
 _SECTORS = 6
 _LEAST_LINES, _LEAST_SECTORS, _UNSURE = 10, 2, 0.5
-# of other directions' score, of all edges: rooms have at least 2.6 and 0.17, gardens at most 1.9 and 0.07
-_CLEAR, _SHARE = 2.2, 0.1
+# of other directions' score, of all edges, of those that are steep: rooms have at least 2.4, 0.08 and 0.58,
+# what has no uprights at most 1.9, 0.07 and 0.38
+_CLEAR, _SHARE, _STEEP_SHARE = 2.2, 0.1, 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,8 +122,10 @@ def vertical(normals: F64, weights: F64) -> Level:
     sectors = len(set(_sector(normals[upright], best)))
     uncertainty = _uncertainty(best, normals[upright], weights[upright], away[upright])
     tilt = math.degrees(math.acos(min(max(float(best[1]), -1.0), 1.0)))
-    share = float(weights[upright].sum() / weights.sum())
-    if lines < _LEAST_LINES or sectors < _LEAST_SECTORS or clear < _CLEAR or share < _SHARE:
+    length = float(weights[upright].sum())
+    steep = float(weights[np.abs(normals @ best) < 0.5].sum())
+    many = length > _SHARE * float(weights.sum()) or length > _STEEP_SHARE * steep
+    if lines < _LEAST_LINES or sectors < _LEAST_SECTORS or clear < _CLEAR or not many:
         return _none(lines, "too few edges agree on what is upright")
     if uncertainty > _UNSURE:
         return _none(lines, f"upright edges tell the vertical only within {uncertainty:.1f}°")
