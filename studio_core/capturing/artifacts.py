@@ -77,9 +77,6 @@ class Response:
     rms: float = 0.0
     """Of what the curve leaves unexplained, log2."""
     linear: bool = False
-    balance: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    """log2 to add to the curves of red, green and blue so that full numbers are white: channels with curves
-    of their own are alike at their ends, not in the middle."""
     notes: tuple[str, ...] = ()
 
 

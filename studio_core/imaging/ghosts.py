@@ -24,6 +24,7 @@ _CELLS = 700  # along the longer side, about
 _STRONG = 0.3  # log2 beyond the tolerance, of the heart of something that moved
 _TOLERANCE = 0.08  # log2, of response and exposures
 _SIGMAS = 3.0  # of a cell's mean
+_COMPRESSED = 1.5 / 255  # what compression may do to dark numbers that are calm in themselves
 _NOTHING = np.float32(-60.0)
 
 
@@ -67,8 +68,11 @@ def reduced(
     ring = None if circle is None else circle.scaled(scale)
     small, known = warp(small, move, ring, lens)
     clipped, _ = warp(clipped, move, ring, lens)
-    exposure, stubborn = numbers.light(small), numbers.stubborn(small)
-    spread = np.sqrt((numbers.variance(small) - stubborn) * scale**2 + stubborn)  # of the mean of a cell
+    if ring is not None:  # outside there is the rim, which does not turn with the world
+        y, x = np.mgrid[0 : size[1], 0 : size[0]] + 0.5
+        known &= np.hypot(x - ring.x, y - ring.y) < 0.98 * ring.radius
+    exposure, stubborn = numbers.light(small), numbers.stubborn(small, _COMPRESSED)
+    spread = np.sqrt(numbers.variance(small) * scale**2 + stubborn)  # of the mean of a cell
     high = np.log2(np.maximum(exposure + _SIGMAS * spread, 1e-9) * gain)
     low = np.log2(np.maximum(exposure - _SIGMAS * spread, 1e-9) * gain)
     beyond = clipped > 25

@@ -49,8 +49,14 @@ class Numbers:
         light, weight = exposure * gain, 1 / (variance * gain**2)
         return (lambda n: _looked_up(n, light)), (lambda n: _looked_up(n, weight))
 
-    def stubborn(self, pixels: npt.NDArray[Any]) -> F32:
-        """(..., 3) the part of that variance which neighbours share: rounding and compression."""
+    def stubborn(self, pixels: npt.NDArray[Any], least: float = 0.0) -> F32:
+        """(..., 3) the part of that variance which neighbours share: rounding and compression.
+
+        `least`: of bytes, the least standard deviation that compression has, of numbers 0 … 1.
+        """
+        if pixels.dtype == np.uint8:
+            factor = max(least**2 / self.response.noise[0], 1.0)
+            return _looked_up(pixels, self._table(pixels.dtype)[2] * np.float32(factor))
         if pixels.dtype == np.float32:
             _, slope, _ = self._straight()
             part = (self.response.noise[0] / slope**2).astype(np.float32)
@@ -100,7 +106,7 @@ class Numbers:
         if self.response.linear:
             light = np.maximum(number - black, 0) / (self.top / 2 - black)
         else:
-            light = np.interp(number, level, np.exp2(curve + self.response.balance[channel]))
+            light = np.interp(number, level, np.exp2(curve))
             light[number <= black] = 0.0
         step = self.top / 255  # differences over less follow the steps between levels
         low, high = np.maximum(number - step / 2, 0), np.minimum(number + step / 2, self.top)

@@ -29,7 +29,6 @@ MEASURED, SRGB, LINEAR, LISTED = "measured", "sRGB", "linear", "listed"
 FINE_LEVELS = 4096
 """Of a curve for 16 bit or linear numbers; bytes have 256."""
 _APART = 0.3  # EV between the darkest and the brightest exposure from which a curve can be measured
-_ALIKE = 0.03  # log2 between channels near white that may be error of measurement
 
 
 def solve_response(
@@ -94,7 +93,7 @@ def solve_response(
         found[side] = _exposures(bracket, samples[side], evs, tints, [names[i] for i in order], order)
     answer = Response(
         curve, levels.top, levels.black, levels.white, (0.0, 0.0, 0.0), measure, made.rms,
-        kind == "linear" or (response == LINEAR), _balance(curve, levels) if measure else (0.0, 0.0, 0.0),
+        kind == "linear" or (response == LINEAR),
         tuple(notes),
     )  # fmt: skip
     job.checkpoint(steps, steps)
@@ -215,17 +214,6 @@ def _levels_of(made: Fit, scale: float, levels: Levels, count: int) -> F64:
         curve[c, last + 1 :] = own[-1] + (own[-1] - own[-2]) * np.arange(1, count - last)
         curve[c] -= np.interp(0.5, number, curve[c])
     return curve
-
-
-def _balance(curve: F64, levels: Levels) -> tuple[float, float, float]:
-    """What makes the channels alike near white; nothing where they nearly are."""
-    number = np.linspace(0, 1, curve.shape[1])
-    near = [
-        float(np.interp((b + 0.93 * (w - b)) / levels.top, number, curve[c]))
-        for c, (b, w) in enumerate(zip(levels.black, levels.white, strict=True))
-    ]
-    red, blue = (near[1] - near[c] for c in (0, 2))
-    return (0.0, 0.0, 0.0) if max(abs(red), abs(blue)) < _ALIKE else (red, 0.0, blue)
 
 
 def _exposures(

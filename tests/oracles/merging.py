@@ -20,8 +20,7 @@ def exposure(response: Response, number: float, channel: int) -> float:
     if number <= response.black[channel]:
         return 0.0
     levels = np.linspace(0, response.top, response.curve.shape[1])
-    curve = response.curve[channel] + response.balance[channel]
-    return float(np.interp(number, levels, 2.0**curve))
+    return float(np.interp(number, levels, 2.0 ** response.curve[channel]))
 
 
 @functools.lru_cache(maxsize=20000)
