@@ -20,7 +20,7 @@ from studio_plugins.capture.ring import coarser
 _WIDE = 0.25  # of the circle's radius: how far glare reaches
 _COARSE = 32.0
 _SPREADS = np.array([0.1, 0.04, 0.04, 0.04, 0.006, 0.006])  # prior: gain, tilt, cos, sin, veil of own, other
-_PATCHES = 60  # independent places of the overlap
+_PATCHES = 150  # independent places of the overlap
 _OFF = 0.12  # stops: what parallax leaves between two calm pictures
 _MIDDLE = 5.0  # degrees from either frame: from here on, places count fully
 _NEAR = 9.0  # degrees from a frame: its reflections reach so far
@@ -86,7 +86,7 @@ def balance(overlap: Overlap) -> Balance:
         found = _fitted(x, y, trust.ravel()[places], near, expected)
     gain = np.maximum(shapes @ found[:4], 0.2)
     parts = overlap.veils * found[4:, None, None]
-    return Balance(gain, parts.sum(axis=0), np.abs(parts).sum(axis=0) / 2)
+    return Balance(gain, parts.sum(axis=0), np.abs(parts).sum(axis=0))
 
 
 def _fitted(x: F64, y: F64, trust: F64, near: tuple[Mask, Mask], expected: F64) -> F64:
@@ -98,7 +98,8 @@ def _fitted(x: F64, y: F64, trust: F64, near: tuple[Mask, Mask], expected: F64) 
         off = np.log2(y / made)
         scale = max(_OFF, 0.8 * scale)
         suspect = ((off > 0) & near[0]) | ((off < 0) & near[1])
-        sure = np.asarray(1 / (1 + (np.where(suspect, _SUSPECT, 1.0) * off / scale) ** 2) ** 2, np.float64)
+        size = (np.where(suspect, _SUSPECT, 1.0) * off / scale) ** 2
+        sure = 1 / (1 + size) ** 2
         weight = trust * sure * _PATCHES / (trust.sum() * _OFF**2 * np.log(2) ** 2 * made * y)
         normal = (x * weight[:, None]).T @ x + stiffness
         found = np.linalg.solve(normal, (x * weight[:, None]).T @ y + stiffness @ expected)

@@ -18,10 +18,11 @@ from studio_core.shading.job import Job
 from studio_plugins.capture.compare import STEP, Comparison, compare
 from studio_plugins.capture.ring import runs
 
-_SURE, _PART = 0.42, 0.2  # stops: that a reflection has somewhere, and everywhere
+_SURE, _PART = 0.38, 0.2  # stops: that a reflection has somewhere, and everywhere
 _ALONG = 8.0  # degrees of azimuth that a reflection fills at least, but for a fifth of them
 _STEEP = 0.25  # stops: so much more than a column has itself is not its own
 _NARROWEST = 6.0  # degrees
+_WHOLE = 0.92  # of the turn: a frame that throws light back everywhere cannot be told from a scale
 _MARGIN = 2.0  # degrees that a rectangle reaches further, all round
 _GONE = 0.1  # of the largest excess: there a reflection ends towards the axis
 _UNSEEN = 3.0  # degrees more where it has not ended as far as the other lens sees
@@ -50,7 +51,9 @@ def patches_of(comparison: Comparison, side: str, edge: float, sensitivity: floa
     """Rectangles of one side. `edge`: degrees from the axis to the frame."""
     level = _opened(comparison.score)
     some = np.maximum(level, _opened(comparison.likely))
-    found = []
+    found: list[Patch] = []
+    if (some > _PART / sensitivity).mean() > _WHOLE:  # this is a scale that is wrong
+        return found
     for start, length in runs(some > _PART / sensitivity):
         columns = (start + np.arange(length)) % len(level)
         if length * STEP >= _NARROWEST and level[columns].max() > _SURE / sensitivity:

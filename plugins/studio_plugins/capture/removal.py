@@ -30,7 +30,7 @@ _PENUMBRA = 1.5  # degrees of a rectangle's inner border that are taken as a sou
 _COVERED = 0.4  # of a rectangle that the other lens has to see
 _ACROSS, _ALONG = 0.5, 2.0  # degrees: steps of looking for a clean part of the ring
 _SKEWED = 0.02  # of the radius: how far a picture's own shear moves a ring
-_ROW = 4096
+_ROW, _FRAYED = 4096, 4
 _FINEST = 2 * math.pi / 16384
 
 
@@ -56,6 +56,9 @@ def remove(
             made.append(patch)
             continue
         area = _area(own, patch)
+        if not len(area.pixels):
+            made.append(patch)
+            continue
         taken: _Source | None = None
         other = views.get(_opposite(patch.side))
         if patch.source == OTHER_LENS and other is not None and registration is not None:
@@ -97,10 +100,14 @@ def clean_azimuth(own: View, patch: Patch, patches: Sequence[Patch]) -> float | 
     small = coarser(own, math.degrees(own.lens.half) / _ACROSS)
     count = round(360 / _ALONG)
     azimuth = np.radians((np.arange(count) + 0.5) * _ALONG)
-    outer = min(patch.outer, math.degrees(own.lens.half) - _ACROSS)
+    outer = min(patch.outer, math.degrees(own.lens.half))
     rows = max(2, round((outer - patch.inner) / _ACROSS) + 1)
     theta = np.radians(np.linspace(patch.inner - _ACROSS, outer, rows))
     light, seen = look(small, directions(azimuth[None, :], theta[:, None]))
+    told = seen.mean(axis=1) > 0.98
+    if not told.any():
+        return None
+    light, seen, theta = light[told], seen[told], theta[told]
     tone = _log(light, _floor(own))
     taken = [p for p in patches if p.side == patch.side and p.used]
     grid = np.broadcast_arrays(azimuth[None, :], theta[:, None])
@@ -297,10 +304,15 @@ def _joined(own: View, area: _Area, way: F64, source: _Source) -> _Source:
 
 def _from_ring(own: View, area: _Area, patch: Patch) -> _Source:
     turn = math.radians(patch.source_azimuth - patch.azimuth)
-    c, s = math.cos(turn), math.sin(turn)
-    about = np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]])  # rows times this: turned by `turn`
     grid, known = look(own, directions(area.azimuth[None, :] + turn, area.theta[:, None]))
-    pixels, known_pixels = _look_along(own, area.way @ about)
+    azimuth, theta = angles(area.way)
+    pixels, known_pixels = _look_along(own, directions(azimuth + turn, theta))
+    for inward in range(1, _FRAYED):  # where the source's edge is a little further in
+        lost = np.flatnonzero(~known_pixels)
+        step = own.lens.half / own.circle.radius
+        pixels[lost], known_pixels[lost] = _look_along(
+            own, directions(azimuth[lost] + turn, theta[lost] - inward * step)
+        )
     floor = _floor(own)
     return _Source(_log(grid, floor), _log(pixels, floor), known, known_pixels)
 
@@ -342,6 +354,8 @@ def _rows_of(values: F64) -> F32:
 
 def _look_along(view: View, way: F64) -> tuple[F32, Mask]:
     """As `look`, for directions (N, 3)."""
+    if not len(way):
+        return np.zeros((0, 3), np.float32), np.zeros(0, np.bool_)
     rows = -(-len(way) // _ROW)
     padded = np.zeros((rows * _ROW, 3))
     padded[: len(way)] = way
