@@ -14,8 +14,19 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from studio_core.capturing.artifacts import F32, F64
-from studio_plugins.capture.overlap import Stand, Strip, flattened, ways
+from studio_core.capturing.artifacts import F32, F64, Mask
+from studio_plugins.capture.overlap import (
+    NOTHING,
+    Patches,
+    Stand,
+    Strip,
+    across,
+    flattened,
+    padded,
+    spread,
+    ways,
+)
+from studio_plugins.capture.solve import solved
 
 _CALM = 5.0  # degrees over which tones are levelled before features are looked for
 _RATIO = 0.85
@@ -26,6 +37,7 @@ _MOST = 1200
 _SAMPLES = 400
 _SECTORS = 24
 _ENOUGH = 8
+_PIECE = 24  # degrees
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,7 +52,7 @@ def _features(strip: Strip) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.flo
     """Places (N, 2), descriptors (N, 128) and orientation in degrees of a strip's features."""
     import cv2
 
-    flat = flattened(strip, _CALM)
+    flat = flattened(strip.tone, strip.usable, math.radians(_CALM) / strip.step)
     spread = 1.48 * float(np.median(np.abs(flat[strip.usable]))) if strip.usable.any() else 0.0
     if spread < 1e-3:
         return np.zeros((0, 2)), np.zeros((0, 128), np.float32), np.zeros(0)
@@ -110,7 +122,23 @@ def by_features(front: Strip, back: Strip, fovs: F64, seed: int = 5) -> Guess | 
         at = int(score.argmax())
         if best is None or score[at] > best.score:
             best = Guess(Stand(np.asarray(turns[at], np.float64), float(fov)), float(score[at]))
-    return best if best is not None and best.score >= _ENOUGH / 2 else None
+    if best is None or best.score < _ENOUGH / 2:
+        return None
+    stand = best.stand
+    for _ in range(2):
+        a, b = ways(front, here, stand), ways(back, there, stand) @ stand.turn.T
+        agree = np.linalg.norm(a - b, axis=1) < 1.5 * _CLOSE
+        if agree.sum() < _ENOUGH:
+            break
+        stand = solved(front, back, _as_patches(here[agree], there[agree]), stand, len(fovs) > 1).stand
+    return Guess(stand, best.score)
+
+
+def _as_patches(here: F64, there: F64) -> Patches:
+    """Matches of features, each sure to a quarter of a degree."""
+    count = len(here)
+    surety = np.repeat((np.eye(2) / math.radians(0.25) ** 2)[None], count, axis=0)
+    return Patches(here, there, surety, np.ones(count), np.ones(count), float(count))
 
 
 def _frames(two: F64) -> F64:
@@ -121,47 +149,94 @@ def _frames(two: F64) -> F64:
     return np.stack([middle, normal, np.cross(middle, normal)], axis=-1)
 
 
+def by_sliding(front: Strip, back: Strip, stand: Stand, reach: int = 7) -> Patches:
+    """What a stand may be off by up to `reach` degrees: by how much pieces of the back strip must slide.
+
+    Every piece, 24° wide and as high as the overlap, is tried at all shifts of whole degrees.
+    """
+    here, mask, at = _coarse(front, front, None)
+    there, other_mask, _ = _coarse(front, back, stand)
+    best = np.full(360, -1.0)
+    shift = np.zeros((360, 2), np.intp)
+    for down in range(-reach, reach + 1):
+        rows = slice(max(0, -down), min(len(here), len(here) - down))
+        moved = slice(rows.start + down, rows.stop + down)
+        a, m = here[rows], mask[rows]
+        for along in range(-reach, reach + 1):
+            b, n = np.roll(there[moved], -along, axis=1), np.roll(other_mask[moved], -along, axis=1)
+            both = m & n
+            x, y = a * both, b * both
+            sums = np.stack([part.sum(axis=0) for part in (both, x, y, x * x, y * y, x * y)]).astype(
+                np.float64
+            )
+            sums = np.cumsum(
+                np.concatenate([sums[:, -_PIECE // 2 :], sums, sums[:, : _PIECE // 2]], 1), axis=1
+            )
+            count, x1, y1, xx, yy, xy = (sums[:, _PIECE:] - sums[:, :-_PIECE])[:, :360]
+            few = count < 1.5 * _PIECE
+            count = np.maximum(count, 1)
+            va, vb = xx / count - (x1 / count) ** 2, yy / count - (y1 / count) ** 2
+            like = (xy / count - x1 * y1 / count**2) / np.sqrt(np.maximum(va * vb, 1e-8))
+            like[few | (va < 1e-4) | (vb < 1e-4)] = -1
+            better = like > best
+            best[better] = like[better]
+            shift[better] = along, down
+    column = np.arange(6, 360, _PIECE // 2)
+    column = column[best[column] > 0.5]
+    if not len(column):
+        return NOTHING
+    row = int(np.argmin(np.abs(at[:, 0, 1] - math.pi / 2)))
+    places = at[row, column]
+    seen = across(front, back, places + np.radians(shift[column].astype(np.float64)), stand)
+    surety = np.repeat((np.eye(2) / math.radians(0.5) ** 2)[None], len(column), axis=0)
+    return Patches(places, seen, surety, best[column], best[column], float(best[column].sum()))
+
+
 def by_rolling(front: Strip, back: Strip, fov: float, count: int = 3) -> tuple[Stand, ...]:
     """Stands at the rolls where both strips, blurred, agree best within a few degrees of t."""
-    one, other = (_coarse(strip) for strip in (front, back))
-    low, high = max(one[1], other[1]), min(one[1] + one[0].shape[0], other[1] + other[0].shape[0])
-    columns = one[0].shape[1]
-    score = np.full(columns, -1.0)
+    one, mask, _ = _coarse(front, front, None)
+    other, other_mask, _ = _coarse(front, back, Stand(np.eye(3), fov))
+    one, other = one * mask, other * other_mask
+    rows, other_rows = (np.asarray(m.any(axis=1))[:, None] for m in (mask, other_mask))
+    score = np.full(360, -1.0)
     for lift in range(-4, 5):  # degrees
-        first, last = max(low, low + lift), min(high, high + lift)
-        if last - first < 2:
-            continue
+        first, last = max(0, lift), min(len(one), len(one) + lift)
+        a, b = one[first:last], other[first - lift : last - lift]
         a, b = (
-            one[0][first - one[1] : last - one[1]],
-            other[0][first - lift - other[1] : last - lift - other[1]],
+            a * other_rows[first - lift : last - lift],
+            b * rows[first:last],
         )
         norm = float(np.sqrt((a * a).sum() * (b * b).sum()))
         if norm <= 0:
             continue
         spectrum = (np.fft.rfft(a, axis=1) * np.conj(np.fft.rfft(b, axis=1))).sum(axis=0)
-        score = np.maximum(score, np.fft.irfft(spectrum, columns) / norm)
+        score = np.maximum(score, np.fft.irfft(spectrum, 360) / norm)
     made = []
     for _ in range(count):
         at = int(score.argmax())
         if score[at] <= 0.2:
             break
-        roll = 2 * math.pi * at / columns
-        c, s = math.cos(roll), math.sin(roll)
+        c, s = math.cos(math.radians(at)), math.sin(math.radians(at))
         made.append(Stand(np.array([[c, -s, 0], [s, c, 0], [0, 0, 1.0]]), fov))
-        score[np.mod(np.arange(at - 8, at + 9), columns)] = -1
+        score[np.mod(np.arange(at - 8, at + 9), 360)] = -1
     return tuple(made)
 
 
-def _coarse(strip: Strip) -> tuple[F32, int]:
-    """A strip with a pixel a degree, levelled, and the whole degree its first row begins at."""
+def _coarse(front: Strip, strip: Strip, stand: Stand | None) -> tuple[F32, Mask, F64]:
+    """A strip with a pixel a degree from 60° to 120°, levelled: tones, what is known, and the places.
+
+    With a stand it is the back lens' strip as the front's would be.
+    """
     import cv2
 
-    flat = flattened(strip, 12.0)
-    sigma = math.radians(0.7) / strip.step
-    flat = np.asarray(cv2.GaussianBlur(flat, (0, 0), sigma, borderType=cv2.BORDER_REPLICATE), np.float32)
-    start = math.ceil(math.degrees(strip.first))
-    end = int(math.degrees(strip.first + strip.shape[0] * strip.step))
-    rows = (np.radians(np.arange(start, end) + 0.5) - strip.first) / strip.step - 0.5
-    columns = np.radians(np.arange(360) + 0.5) / strip.step - 0.5
-    x, y = np.meshgrid(columns.astype(np.float32), rows.astype(np.float32))
-    return np.asarray(cv2.remap(flat, x, y, cv2.INTER_LINEAR), np.float32), start
+    a, t = np.meshgrid(np.radians(np.arange(360) + 0.5), np.radians(np.arange(60, 120) + 0.5))
+    at = np.stack([a, t], axis=-1)
+    sigma = 0.6 * math.radians(1) / strip.step
+    weight = strip.usable.astype(np.float32)
+    flat = flattened(strip.tone, strip.usable, math.radians(14) / strip.step)
+    calm = spread(np.dstack([flat, weight]), sigma)
+    tone = padded(np.where(strip.usable, calm[..., 0] / np.maximum(calm[..., 1], 1e-3), 0).astype(np.float32))
+    x, y = strip.pixels(at if stand is None else across(front, strip, at, stand))
+    known = cv2.remap(padded(weight), x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT)
+    made = cv2.remap(tone, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT)
+    return np.asarray(made, np.float32), np.greater(known, 0.9).astype(np.bool_), at

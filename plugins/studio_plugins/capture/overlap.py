@@ -81,6 +81,23 @@ class Stand:
     back: F64 = field(default_factory=lambda: np.zeros(2))
 
 
+@dataclass(frozen=True, eq=False)
+class Patches:
+    """Shifts that were seen: `here` in the front strip, `there` in the back strip (N, 2), `surety` (N, 2, 2)
+    inverse covariance of the front place, radians⁻²; `likeness` (N,) correlation of the two; `contrast`
+    (N,) of what both show, in log2, and `tried` its sum over all patches, those that fit no better too."""
+
+    here: F64
+    there: F64
+    surety: F64
+    likeness: F64
+    contrast: F64
+    tried: float
+
+
+NOTHING = Patches(np.zeros((0, 2)), np.zeros((0, 2)), np.zeros((0, 2, 2)), np.zeros(0), np.zeros(0), 0.0)
+
+
 def shrunk(light: F32, usable: Mask, size: tuple[int, int]) -> tuple[F32, F32]:
     """Usable light averaged to a picture of `size` (width, height), and what share of each was usable."""
     import cv2
@@ -187,22 +204,27 @@ def across(front: Strip, back: Strip, at: F64, stand: Stand) -> F64:
     return places(back, ways(front, at, stand) @ stand.turn, stand)
 
 
-def flattened(strip: Strip, degrees: float) -> F32:
-    """log2 luminance without what changes over more than `degrees`; 0 where nothing is usable."""
+def flattened(tone: F32, usable: Mask, sigma: float) -> F32:
+    """A strip's tones without what changes over more than `sigma` pixels; 0 where nothing is usable."""
+    weight = usable.astype(np.float32)
+    mean = spread(np.dstack([np.where(usable, tone, np.float32(0)), weight]), sigma)
+    made = np.where(usable, tone - mean[..., 0] / np.maximum(mean[..., 1], 1e-6), 0)
+    return np.asarray(made, np.float32)
+
+
+def spread(picture: F32, sigma: float) -> F32:
+    """Gaussian means (rows, columns, C) of a strip's channels: it closes in itself, beyond its rows is 0."""
     import cv2
 
-    sigma = math.radians(degrees) / strip.step
-    size = int(3 * sigma) * 2 + 1
-    weight = strip.usable.astype(np.float32)
-    tone = np.where(strip.usable, strip.tone, np.float32(0))
-    wide = size // 2
-    both = np.concatenate([(tone * weight)[..., None], weight[..., None]], axis=2)
-    while wide > both.shape[1]:
-        wide //= 2
-    around = np.concatenate([both[:, -wide:], both, both[:, :wide]], axis=1)
-    mean = cv2.GaussianBlur(around, (size, size), sigma, borderType=cv2.BORDER_CONSTANT)[:, wide:-wide]
-    made = np.where(strip.usable, tone - mean[..., 0] / np.maximum(mean[..., 1], 1e-6), 0)
-    return np.asarray(made, np.float32)
+    wide = min(int(3 * sigma) + 1, picture.shape[1])
+    around = np.concatenate([picture[:, -wide:], picture, picture[:, :wide]], axis=1)
+    size = 2 * int(3 * sigma) + 1
+    made = np.empty_like(picture)
+    for first in range(0, picture.shape[2], 4):
+        part = np.ascontiguousarray(around[..., first : first + 4], np.float32)
+        blurred = cv2.GaussianBlur(part, (size, size), sigma, borderType=cv2.BORDER_CONSTANT)
+        made[..., first : first + 4] = blurred.reshape(part.shape)[:, wide:-wide]
+    return made
 
 
 def rotation_of(stand: Stand) -> F64:

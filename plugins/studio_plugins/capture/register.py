@@ -12,17 +12,20 @@ from studio_core.capturing.standing import rotation_from
 from studio_core.imaging.projection import OCAM, ORTHOGRAPHIC, Circle, Lens
 from studio_core.shading.job import Job
 from studio_plugins.capture.falloff import Balance, balanced, from_loss
-from studio_plugins.capture.guesses import by_features, by_rolling
+from studio_plugins.capture.guesses import by_features, by_rolling, by_sliding
 from studio_plugins.capture.overlap import Stand, Strip, rotation_of, stand_of, unroll
-from studio_plugins.capture.refine import Fit, refined
+from studio_plugins.capture.refine import BLURS, refined
+from studio_plugins.capture.solve import Fit, solved
 
 _FINEST = 5.0  # pixels a degree of the strips
 _LEAST_OVERLAP = 2.0  # degrees
+_NARROW = 187.0  # of what must fit together all around
 _NARROWEST = 170.0  # of a guess that may be mended
 _FURTHER = math.radians(26)  # how far inside the other's edge a lens' strip begins
 _FOVS = np.arange(0.90, 1.151, 0.01)
 _UNLIKE = 1.0  # log2
 _STEPS = 6
+_FEWEST, _SHARE_OF_PIECES, _DEGREES_OF_PIECES = 6, 0.45, 60  # that must slide together
 
 
 def register(
@@ -72,24 +75,31 @@ def _fitted(front: Strip, back: Strip, by_hand: Stand, fit_fov: bool, job: Job) 
     fovs = np.array([f for f in fov * _FOVS if _possible(front.lens, f)]) if fit_fov else np.array([fov])
     guess = by_features(front, back, fovs)
     job.checkpoint(2, _STEPS)
-    best = refined(front, back, guess.stand, fit_fov) if guess is not None else None
+    best = refined(front, back, guess.stand, fit_fov, BLURS[1:]) if guess is not None else None
     job.checkpoint(3, _STEPS)
-    if best is not None and not _doubtful(best):
+    if best is not None and _sure(best):
         return best
-    rough = []
-    for at in (fov,) if not fit_fov else (fov, 0.97 * fov, 1.03 * fov):
-        if not _possible(front.lens, at):
+    for stand in (by_hand, *by_rolling(front, back, fov)):
+        slid = by_sliding(front, back, stand)
+        job.checkpoint(3, _STEPS)
+        if len(slid.here) < _FEWEST:
             continue
-        for stand in (Stand(by_hand.turn, at), *by_rolling(front, back, at)):
-            rough.append(refined(front, back, stand, fit_fov, (3.0, 1.5)))
-            job.checkpoint(3, _STEPS)
-    rough.sort(key=_worth, reverse=True)
-    for one in rough[:2]:
-        fit = refined(front, back, one.stand, fit_fov, (1.5, 1.0, 0.5, 0.25))
-        job.checkpoint(4, _STEPS)
-        if best is None or _worth(fit) > _worth(best):
-            best = fit
+        start = solved(front, back, slid, stand, fit_fov)
+        if start.share < _SHARE_OF_PIECES or start.support < _DEGREES_OF_PIECES:
+            continue
+        for blurs in (BLURS[1:], BLURS):
+            fit = refined(front, back, start.stand, fit_fov, blurs)
+            job.checkpoint(4, _STEPS)
+            if best is None or _worth(fit) > _worth(best):
+                best = fit
+            if _sure(best):
+                return best
     return best
+
+
+def _sure(fit: Fit) -> bool:
+    """Whether nothing better need be looked for."""
+    return fit.share > 0.6 and not _doubtful(fit)
 
 
 def _possible(lens: Lens, fov: float) -> bool:
@@ -109,10 +119,12 @@ def _doubtful(fit: Fit | None) -> str:
     """Why a fit is not to be believed; "" when it is."""
     if fit is None or len(fit.left) < 8:
         return "Both lenses' edges show too little in common to register them by."
-    if fit.share < 0.35 or fit.support < 45:
+    if fit.share < 0.3 or fit.support < 45:
         return "What both lenses see at their edges does not fit together well enough to register them by."
-    if fit.doubt > 1.0 or fit.spread > 0.6:
+    if fit.doubt > 1.0 or fit.spread > 0.45:
         return "What both lenses see leaves their rotation uncertain."
+    if fit.stand.fov < _NARROW and fit.share < 0.7:
+        return f"A field of view of about {fit.stand.fov:.0f}° leaves too little overlap to register by."
     return ""
 
 

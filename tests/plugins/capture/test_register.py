@@ -81,7 +81,7 @@ def test_a_phone_that_is_a_little_off(plain: Truth) -> None:
     assert found.trusted
     assert apart(found.rotation, plain.rotation) < 0.3
     assert found.lens.fov == pytest.approx(196, rel=0.005)
-    assert found.spread < 0.3
+    assert found.spread < 0.1
     assert found.gain == pytest.approx(1, abs=0.02)
     s = np.linspace(0, 1, 9)
     assert light_at(found.falloff, s) == pytest.approx(PHONE.falloff_at(s), abs=0.05)
@@ -119,8 +119,8 @@ def test_near_things_move_it_little() -> None:
     truth = lens_light(room(6), replace(PHONE, parallax=1.0), 1)
     found = registered(truth)
     assert found.trusted
-    assert apart(found.rotation, truth.rotation) < 0.6
-    assert found.lens.fov == pytest.approx(196, rel=0.006)
+    assert apart(found.rotation, truth.rotation) < 0.35
+    assert found.lens.fov == pytest.approx(196, rel=0.005)
 
 
 def test_exposure_and_white_of_the_back_lens(plain: Truth) -> None:
