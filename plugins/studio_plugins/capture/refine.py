@@ -143,7 +143,7 @@ def compared(front: Strip, back: Strip, stand: Stand, blur: float) -> Patches:
     surety = texture / (unexplained * pixels)[:, None, None] / front.step**2
     limit = max(1.5 * blur, 0.5)  # degrees
     fits = np.hypot(*shift.T) * front.step < math.radians(limit)
-    textured = (va > 1e-5) & (vb > 1e-5) & (count > 0.15 * count.max())
+    textured = (va > 1e-5) & (vb > 1e-5) & (count > 0.15 * count.max(initial=0.0))
     keep = (likeness > (_AGREE if blur < 1 else 0.3)) & fits & textured
     contrast = np.where(textured, np.maximum(va * vb, 0) ** 0.25, 0)
     here, there = here[keep], across(front, back, here[keep] + shift[keep] * front.step, stand)
