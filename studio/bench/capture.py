@@ -91,11 +91,16 @@ def run(report: Report, program: Headless) -> None:
 
 
 def _others(report: Report, program: Headless, setup: Setup, maps: Mapping[str, Path]) -> None:
-    from studio.bench import capture_brackets, capture_clone, capture_pipeline
+    from studio.bench import capture_brackets, capture_clone, capture_pipeline, capture_reflections
 
     if report.wants("brackets") and maps:
         rooms = {name: read_map(path) for name, path in maps.items()}
         capture_brackets.measure(report, rooms, setup.heaps)
+        report.keep()
+    if report.wants("reflections") and maps:
+        with program.job("reflections") as job:
+            rooms = {name: read_map(path) for name, path in maps.items()}
+            capture_reflections.measure(report, job, rooms, setup.captures)
         report.keep()
     if report.wants("clone"):
         capture_clone.measure(report, setup.clone)

@@ -14,8 +14,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from studio.bench import capture, capture_clone, capture_measure
-from studio.bench.phone import Phone, Shots, shoot
+from studio.bench import capture, capture_clone, capture_measure, capture_reflections
+from studio.bench.harness import Report
+from studio.bench.phone import Arc, Phone, Shots, shoot
 from studio.bench.phone_optics import look_up, turn
 from studio.bench.phone_random import random_phone
 from studio.bench.phone_response import Curve
@@ -31,10 +32,12 @@ from studio_core.capturing.artifacts import (
     Response,
     Stitched,
 )
+from studio_core.capturing.settings import Patch
 from studio_core.imaging.encode import write_exr
 from studio_core.imaging.latlong import equirect_direction
 from studio_core.imaging.projection import Circle
 from studio_core.scene.geometry import Image
+from studio_core.shading.job import Job
 
 PHONE = Phone(size=(80, 64), circle=Circle(40, 31, 29), samples=1, tilt=(10, 5, -3))
 
@@ -267,3 +270,41 @@ def test_curves_that_differ_by_a_factor_are_one() -> None:
     other = capture_measure.response_error(response, Curve("sRGB"))
     assert other.rms > 0.01
     assert other.log2 > 0.05
+
+
+def test_arcs_and_rectangles_are_counted_by_the_azimuths_they_share() -> None:
+    arcs = [
+        Arc("front", 350, 40, stops=1.0),
+        Arc("front", 100, 30, stops=0.5),
+        Arc("back", 350, 40, stops=2.0),
+    ]
+    over = Patch("front", 328, 44, 88, 95)  # 330 … 10 and a margin of 2
+    half = Patch("back", 340, 15, 88, 95)
+    beside = Patch("front", 200, 20, 88, 95)
+    count = capture_reflections.Count()
+    count.add(arcs, [over, half, beside])
+    assert (count.strong, count.found) == (2, 1)
+    assert (count.rectangles, count.right) == (3, 2)
+    assert (count.clean, count.touched) == (0, 0)
+    count.add([], [beside])
+    count.add([], [])
+    assert (count.clean, count.touched) == (2, 1)
+    assert capture_reflections.azimuths(arcs[0])[[330, 359, 0, 9]].all()
+    assert not capture_reflections.azimuths(arcs[0])[[329, 10]].any()
+
+
+def test_reflections_are_looked_for_in_every_capture() -> None:
+    report = Report("capture", True)
+    rooms = {"even": np.ones((32, 64, 3), np.float32)}
+    capture_reflections.measure(report, Job("x"), rooms, 3, radius=40.0)
+    found = {row.metric: row.value for row in report.rows}
+    assert found["captures"] == 3
+    assert found["unregistered"] == 1  # there is nothing to register by
+    assert found["clean_touched"] == 0
+    assert found["arcs"] == sum(
+        arc.stops > 0.7
+        for index in range(3)
+        for arc in random_phone(
+            capture_reflections.FIRST + index, False, radius=40.0, reflections=index % 3 > 0
+        ).arcs
+    )
