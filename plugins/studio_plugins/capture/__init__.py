@@ -9,5 +9,5 @@ plugin = Plugin(
     id="capture",
     label="Capture: a room's light from photographs",
     api=API,
-    provides={},
+    provides={"capturer": {"fisheye": "studio_plugins.capture.pipeline:CAPTURER"}},
 )

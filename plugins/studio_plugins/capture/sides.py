@@ -1,0 +1,58 @@
+"""Which part of the photographs is which lens': circles found, and two of them in one picture taken apart."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+from studio_core.capturing.artifacts import Bracket, Brackets, FoundCircle
+from studio_core.capturing.settings import BACK, DUAL, EQUIRECTANGULAR, FRONT
+from studio_core.errors import InputError
+from studio_core.imaging.projection import Circle
+from studio_core.shading.job import Job
+from studio_plugins.capture.circle import find_circles
+from studio_plugins.capture.progress import StageJob
+
+_AROUND = 0.06
+"""Kept around a circle that is cut out, of its radius."""
+
+
+def cut_out(brackets: Brackets, job: Job) -> tuple[dict[str, Bracket], dict[str, FoundCircle]]:
+    """A bracket for each lens, and its circle in the bracket's pictures (none in equirectangular ones).
+
+    Of two circles in one picture the left one, or the upper one, is the front.
+    """
+    if brackets.layout == EQUIRECTANGULAR:
+        return dict(brackets.sides), {}
+    if brackets.layout == DUAL:
+        return _two(brackets.sides[FRONT], job)
+    found = {}
+    for place, (side, bracket) in enumerate(brackets.sides.items()):
+        part = StageJob(job, place / len(brackets.sides), 1 / len(brackets.sides))
+        found[side] = find_circles([shot.pixels for shot in bracket.shots], 1, part)[0]
+    return dict(brackets.sides), found
+
+
+def _two(bracket: Bracket, job: Job) -> tuple[dict[str, Bracket], dict[str, FoundCircle]]:
+    circles = find_circles([shot.pixels for shot in bracket.shots], 2, job)
+    if len(circles) != 2:
+        name = bracket.shots[0].facts.name
+        raise InputError(f"{name} was to show two circles, but only {len(circles)} can be found in it.")
+    apart_x, apart_y = (abs(getattr(circles[0].circle, a) - getattr(circles[1].circle, a)) for a in "xy")
+    first_to_last = sorted(circles, key=lambda one: one.circle.x if apart_x >= apart_y else one.circle.y)
+    sides, found = {}, {}
+    for side, one in zip((FRONT, BACK), first_to_last, strict=True):
+        sides[side], found[side] = _cut(bracket, one)
+    return sides, found
+
+
+def _cut(bracket: Bracket, found: FoundCircle) -> tuple[Bracket, FoundCircle]:
+    width, height = bracket.shots[0].size
+    circle, reach = found.circle, found.circle.radius * (1 + _AROUND)
+    left, top = max(math.floor(circle.x - reach), 0), max(math.floor(circle.y - reach), 0)
+    right, bottom = min(math.ceil(circle.x + reach), width), min(math.ceil(circle.y + reach), height)
+    shots = tuple(
+        dataclasses.replace(shot, pixels=shot.pixels[top:bottom, left:right]) for shot in bracket.shots
+    )
+    inside = Circle(circle.x - left, circle.y - top, circle.radius)
+    return dataclasses.replace(bracket, shots=shots), dataclasses.replace(found, circle=inside)
