@@ -22,7 +22,9 @@ def test_rows_tell_how_many_heaps_were_parted_rightly(room: np.ndarray) -> None:
     report = Report("capture", quick=True)
     capture_brackets.measure(report, {"room": room}, 1)
     found = {row.metric: row.value for row in report.rows}
-    assert set(found) == {f"{kind}_{told}" for kind in ("parted", "one") for told in capture_brackets.TOLD}
+    told_rows = {f"{kind}_{told}" for kind in ("parted", "one") for told in capture_brackets.TOLD}
+    assert set(found) == told_rows | {"layout_dual", "layout_wide"}
+    assert found["layout_dual"] == found["layout_wide"] == 1
     shots = capture_brackets.taken(room, 0)
     for told in capture_brackets.TOLD:
         assert found[f"parted_{told}"] == capture_brackets.parted(shots, told, 0)

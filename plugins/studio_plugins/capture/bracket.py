@@ -121,9 +121,10 @@ def _layout(taken: Sequence[_Taken]) -> str:
     """What the photographs show, by those of the most frequent size."""
     sizes = [t.photograph.size for t in taken]
     size = max(dict.fromkeys(sizes), key=sizes.count)
-    look = well_exposed([t.look for t in taken if t.photograph.size == size])
+    looks = [t.look for t in taken if t.photograph.size == size]
+    look = well_exposed(looks)
     aspect = size[0] / size[1]
-    if _WIDE[0] <= aspect <= _WIDE[1] and two_discs(look):
+    if _WIDE[0] <= aspect <= _WIDE[1] and any(two_discs(one) for one in looks):
         return DUAL
     round_about = _TWICE_AS_WIDE[0] <= aspect <= _TWICE_AS_WIDE[1] and goes_round(look)
     return EQUIRECTANGULAR if round_about and not dark_ends(look) else TWO_PICTURES

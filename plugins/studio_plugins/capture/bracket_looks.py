@@ -22,8 +22,8 @@ _DARK, _FULL = 0.03, 0.97
 _LEAST = 300  # pixels that two looks must share
 _CLUMP = 25  # pixels that have one structure in common: as if there were so many fewer
 _NOISE = 0.004  # of numbers in 0 … 1: structure below is none
+_DARKER = 0.4  # of light: what is outside a lens' image
 _LIT = 0.08  # of the upper quartile's light
-_PLACES = (15, 35), (42, 58), (65, 85)  # percent of the width: where two discs are, and between them
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,12 +80,25 @@ def well_exposed(looks: Sequence[Look]) -> Look:
 
 
 def two_discs(look: Look) -> bool:
-    """Whether the light lies in two discs side by side."""
-    lit = _lit(look)
-    columns, width = lit.mean(axis=0), lit.shape[1]
-    left, middle, right = (columns[width * a // 100 : width * b // 100] for a, b in _PLACES)
-    filled = min(float(left.max()), float(right.max()))
-    return filled > 0.5 and float(middle.min()) < 0.5 * filled and _corners(lit) < 0.3
+    """Whether the light lies in two discs side by side: dark in the corners of both halves, not beside."""
+    light = look.numbers**2.2
+    height, width = light.shape
+    y, x = np.mgrid[0:height, 0:width] + 0.5
+    reach = np.hypot((x % (width / 2) - width / 4) / (width / 4), (y - height / 2) / (height / 2))
+    outside, content = reach > 1.2, float(np.quantile(light[reach < 0.8], 0.3))
+    places = (x < width / 4), (np.abs(x - width / 2) < width / 4), (x > width * 3 / 4)
+    corners = [
+        float(np.median(light[outside & place & half]))
+        for place in places
+        for half in (y < height / 2, y > height / 2)
+    ]
+    sides = (width * 8 // 100, width * 20 // 100), (width * 80 // 100, width * 92 // 100)
+    middle = light[height * 35 // 100 : height * 65 // 100]
+    beside = min(float(np.median(middle[:, first:last])) for first, last in sides)
+    # a lamp at the edge may light one corner up
+    dark = float(np.quantile(light[outside], 0.7)) < _DARKER * content
+    dark &= sorted(corners)[-2] < 0.6 * content
+    return dark and float(np.median(corners[:2] + corners[4:])) < 0.7 * beside
 
 
 def dark_ends(look: Look) -> bool:
@@ -105,12 +118,6 @@ def _lit(look: Look) -> npt.NDArray[np.bool_]:
     light = look.numbers**2.2
     made: npt.NDArray[np.bool_] = light > _LIT * float(np.quantile(light, 0.75))
     return made
-
-
-def _corners(lit: npt.NDArray[np.bool_]) -> float:
-    size = max(lit.shape[0] // 10, 1)
-    rows = lit[:size], lit[-size:]
-    return float(np.mean([row[:, end].mean() for row in rows for end in (slice(size), slice(-size, None))]))
 
 
 def _encoded(small: npt.NDArray[Any]) -> F32:
