@@ -151,7 +151,8 @@ class _StepDelegate(QStyledItemDelegate):
         lower = QRect(inner.left(), upper.bottom() + 1, inner.width(), inner.height() - upper.height())
         metrics = option.fontMetrics
         painter.setPen(QColor(text))
-        painter.drawText(upper, Qt.AlignmentFlag.AlignVCenter, str(index.data()))
+        where = upper if told.line else inner
+        painter.drawText(where, Qt.AlignmentFlag.AlignVCenter, str(index.data()))
         painter.setPen(QColor(dim))
         line = metrics.elidedText(told.line, Qt.TextElideMode.ElideRight, lower.width())
         painter.drawText(lower, Qt.AlignmentFlag.AlignVCenter, line)

@@ -14,7 +14,7 @@ from studio_core.capturing.artifacts import CaptureState, LensLight
 from studio_core.capturing.settings import DUAL, NOT_CALIBRATED, CaptureSettings
 
 MarkOf = Literal["done", "warning", "error", "working", "waiting"]
-_OFF = 0.3  # EV between listed and measured steps, from which on it is told
+_MOST = 6  # numbers that a line of the report tells
 
 
 @dataclass(frozen=True)
@@ -108,8 +108,11 @@ def _photographs(state: CaptureState, settings: CaptureSettings) -> Told:
 
 def _light(state: CaptureState, settings: CaptureSettings) -> Told:
     warnings: list[str] = []
+    if state.response is not None:
+        warnings += state.response.notes
     for side, light in state.lights.items():
-        warnings += exposure_warnings(side, light)
+        warnings += light.exposures.notes or exposure_warnings(side, light)
+        warnings += light.notes
         shaken = sum(not motion.trusted for motion in light.motions)
         if shaken:
             what = "exposure" if shaken == 1 else "exposures"
@@ -118,7 +121,7 @@ def _light(state: CaptureState, settings: CaptureSettings) -> Told:
         return Told("waiting")
     stops = [_once(light, span) for light in state.lights.values()]
     share = max(_once(light.clipped, _share) for light in state.lights.values())
-    line = f"{max(stops):.1f} stops of light"
+    line = f"{max(stops):.0f} stops of light"
     if state.response is not None and not state.response.measured:
         line += ", response assumed"
     line += f", {_percent(share)} clipped in every exposure" if share > 0 else ", nothing clipped"
@@ -178,6 +181,8 @@ def _lens(state: CaptureState, settings: CaptureSettings) -> Told:
     line = f"{registration.lens.model}, {registration.lens.fov:.1f}°"
     if registration.matches:
         line += f", {registration.spread:.2f}° between the lenses"
+    if not registration.trusted and not registration.notes:
+        warnings.append("How the lenses stand to each other could not be found: they are taken back to back.")
     return _said(line, [*warnings, *registration.notes])
 
 
@@ -220,7 +225,7 @@ def _result(state: CaptureState, settings: CaptureSettings) -> Told:
         return Told("waiting")
     image = state.captured.environment.pixels
     line = f"{image.shape[1]} × {image.shape[0]}, cube of {state.captured.faces.shape[1]}"
-    return _said(line, state.captured.notes)
+    return Told("done", line)
 
 
 def _percent(share: float) -> str:
@@ -238,19 +243,34 @@ _LINES: Mapping[str, Callable[[CaptureState, CaptureSettings], Told]] = {
 }
 
 
-def report_rows(report: Mapping[str, Any], above: str = "") -> list[tuple[str, str]]:
-    """Name and value of everything in a report; names of inner maps follow those they are in."""
-    rows: list[tuple[str, str]] = []
-    for name, value in report.items():
-        path = f"{above} ▸ {_words(name)}" if above else _words(name)
-        if isinstance(value, Mapping):
-            rows += report_rows(value, path)
-        elif isinstance(value, list | tuple) and value and isinstance(value[0], Mapping):
-            for number, inner in enumerate(value, 1):
-                rows += report_rows(inner, f"{path} {number}")
-        else:
-            rows.append((path, _value(value)))
-    return rows
+@dataclass(frozen=True)
+class Line:
+    """A line of the report, with those under it."""
+
+    name: str
+    value: str = ""
+    below: tuple[Line, ...] = ()
+
+
+def report_lines(report: Mapping[str, Any]) -> tuple[Line, ...]:
+    """Name and value of everything in a report, what belongs together under one line."""
+    return tuple(_line(_words(name), value) for name, value in report.items())
+
+
+def _line(name: str, value: Any) -> Line:
+    if isinstance(value, Mapping):
+        below = report_lines({n: inner for n, inner in value.items() if n != "name"})
+        return Line(name, str(value.get("name", "")), below)
+    if isinstance(value, list | tuple):
+        if any(isinstance(inner, Mapping) for inner in value):
+            return Line(name, str(len(value)), tuple(_line(str(i), v) for i, v in enumerate(value, 1)))
+        if value and all(isinstance(inner, str) for inner in value):
+            return Line(name, str(len(value)), tuple(Line(str(i), v) for i, v in enumerate(value, 1)))
+        if len(value) > _MOST:
+            return Line(name, f"{len(value)} numbers")
+        if any(isinstance(inner, list | tuple) for inner in value):
+            return Line(name, "", tuple(_line(str(i), v) for i, v in enumerate(value, 1)))
+    return Line(name, _value(value))
 
 
 def _words(name: str) -> str:

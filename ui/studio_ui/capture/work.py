@@ -177,7 +177,7 @@ class CaptureWork(QWidget):
         names = form.pictures()
         name = self.names.get(self.step, "")
         if name not in names:
-            name = self._same_side(names) or (names[0] if names else "")
+            name = self._same_side(names) or form.first()
         self.preview.offer(names, name)
         form.shown(name)
         picture = form.picture(name) if name else None

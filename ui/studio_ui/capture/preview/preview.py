@@ -183,6 +183,7 @@ class Preview(QWidget):
         if self._counted is shown.pixels:
             return
         self._counted = pixels = shown.pixels
+        self.histogram.show_histogram(None)
         found: list[Histogram] = []
         shares: list[tuple[str, float]] = []
 

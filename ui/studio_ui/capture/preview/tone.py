@@ -13,6 +13,7 @@ from studio_core.kernels.tonemap import tonemap
 Rgb = tuple[int, int, int]
 _FEW = 40_000  # pixels that are looked at to find an exposure
 _MIDDLE = 0.18
+_FRAME = 2.0**-8  # of the bright light: what is darker is mostly the frame around a lens' circle
 
 
 def displayed(pixels: npt.NDArray[Any], exposure: float) -> npt.NDArray[np.uint8]:
@@ -37,7 +38,7 @@ def numbers(values: npt.NDArray[Any]) -> str:
 
 
 def natural_exposure(pixels: npt.NDArray[Any]) -> float:
-    """EV that shows most of the light well: the logarithm's mean at a middle grey, in thirds of a stop."""
+    """EV that shows most of the light well: its logarithm's mean at a middle grey, in thirds of a stop."""
     if pixels.dtype != np.float32:
         return 0.0
     skip = max(1, int((pixels.shape[0] * pixels.shape[1] / _FEW) ** 0.5))
@@ -45,7 +46,7 @@ def natural_exposure(pixels: npt.NDArray[Any]) -> float:
     lit = luminance[np.isfinite(luminance) & (luminance > 0)]
     if not lit.size:
         return 0.0
-    lit = lit[lit >= np.percentile(lit, 20)]  # the frame around a lens' circle is black
+    lit = lit[lit >= np.percentile(lit, 99) * _FRAME]
     found = np.log2(_MIDDLE) - float(np.log2(lit).mean())
     return round(3 * found) / 3
 

@@ -30,10 +30,13 @@ FACINGS = {
     "the right": (-1.0, 0.0, 0.0),
 }
 _ELSEWHERE = "a place in the picture"
+_BEFORE = "as before, where the lamp was off"
+_FACING_TIP = "Where the lux meter's dome looked"
 _PICKS = {
     "card": ("Pick the card", "Grey card"),
     "place": ("Pick the surface", "Measured"),
     "facing": ("Pick where it faced", "Meter faces"),
+    "sun_facing": ("Pick where it faced then", "Meter faces with the lamp"),
 }
 
 
@@ -49,14 +52,14 @@ class CalibrationStep(StepForm):
         self.place_tool.preview = lambda place: desk.preview("calibration", self._label(), **self._at(place))
         self.place_tool.commit, self.place_tool.cancel = desk.commit, desk.cancel
         self.column.addWidget(self.form("calibration"))
-        self.facing = Combo()
-        self.facing.setAccessibleName("The meter faced")
-        self.facing.setToolTip("Where the lux meter's dome looked")
-        self.facing.addItems([*FACINGS, _ELSEWHERE])
-        self.facing.activated.connect(self._faced)
-        self._row = QWidget()
-        form_layout(self._row).addRow(form_label("Facing", "Where the lux meter's dome looked"), self.facing)
-        self.column.addWidget(self._row)
+        self.facing = _choice("Facing", [*FACINGS, _ELSEWHERE])
+        self.facing.activated.connect(lambda i: self._faced("facing", self.facing.itemText(i)))
+        self._row = _labelled("Facing", self.facing)
+        self.sun_facing = _choice("Facing with the lamp", [_BEFORE, *FACINGS, _ELSEWHERE])
+        self.sun_facing.activated.connect(lambda i: self._faced("sun_facing", self.sun_facing.itemText(i)))
+        self._sun_row = _labelled("Facing then", self.sun_facing)
+        for widget in (self._row, self._sun_row):
+            self.column.addWidget(widget)
         self.picks: dict[str, QPushButton] = {}
         group = QButtonGroup(self)
         group.setExclusive(False)
@@ -87,8 +90,11 @@ class CalibrationStep(StepForm):
         faces = settings.scale == LUX or settings.sun
         self._row.setVisible(faces)
         known = {facing: text for text, facing in FACINGS.items()}
-        with QSignalBlocker(self.facing):
+        self._sun_row.setVisible(settings.sun)
+        with QSignalBlocker(self.facing), QSignalBlocker(self.sun_facing):
             self.facing.setCurrentText(known.get(settings.facing, _ELSEWHERE))
+            then = settings.sun_facing
+            self.sun_facing.setCurrentText(_BEFORE if then is None else known.get(then, _ELSEWHERE))
         wanted = self._wanted()
         for name, button in self.picks.items():
             button.setVisible(wanted[name])
@@ -130,6 +136,7 @@ class CalibrationStep(StepForm):
             "card": settings.white == GREY_CARD,
             "place": settings.scale == LUMINANCE,
             "facing": faces and settings.facing not in FACINGS.values(),
+            "sun_facing": settings.sun and settings.sun_facing not in (None, *FACINGS.values()),
         }
 
     def pictures(self) -> list[str]:
@@ -143,13 +150,13 @@ class CalibrationStep(StepForm):
             return None
         pixels = captured.environment.pixels
         self.place_tool.size = (pixels.shape[1], pixels.shape[0])
-        marks = self.marks(captured, lambda: unresolved_marks(captured))
+        marks = self.marks((captured,), lambda: unresolved_marks(captured))
         return Shown("finished", "All around", pixels, marks, around=True, say=direction_text(pixels.shape))
 
     def _place(self, name: str) -> Place:
         settings = self.desk.settings.calibration
-        if name == "facing":
-            u, v = direction_to_uv(np.array(settings.facing))
+        if name.endswith("facing"):
+            u, v = direction_to_uv(np.array(getattr(settings, name)))
             return float(u) % 1, float(v)
         found: Place = getattr(settings, name)
         return found
@@ -159,9 +166,9 @@ class CalibrationStep(StepForm):
 
     def _at(self, place: Place) -> dict[str, object]:
         name = self.place_tool.picking
-        if name == "facing":
+        if name.endswith("facing"):
             x, y, z = (round(float(c), 6) for c in equirect_direction(*place))
-            return {"facing": (x, y, z)}
+            return {name: (x, y, z)}
         return {name: (round(place[0], 6), round(place[1], 6))}
 
     def _pick(self, name: str, on: bool) -> None:
@@ -174,13 +181,26 @@ class CalibrationStep(StepForm):
             self.place_tool.picking = ""
         self.redraw()
 
-    def _faced(self, index: int) -> None:
-        text = self.facing.itemText(index)
+    def _faced(self, name: str, text: str) -> None:
         facing = FACINGS.get(text)
-        if facing is None:
+        if facing is None and text == _ELSEWHERE:
             x, y, z = equirect_direction(0.4, 0.4)
             facing = (round(float(x), 6), round(float(y), 6), round(float(z), 6))
-        self.desk.apply("calibration", "Where the meter faced", facing=facing)
+        self.desk.apply("calibration", "Where the meter faced", **{name: facing})
+
+
+def _choice(name: str, texts: list[str]) -> Combo:
+    made = Combo()
+    made.setAccessibleName(name)
+    made.setToolTip(_FACING_TIP)
+    made.addItems(texts)
+    return made
+
+
+def _labelled(name: str, field: QWidget) -> QWidget:
+    made = QWidget()
+    form_layout(made).addRow(form_label(name, _FACING_TIP), field)
+    return made
 
 
 def direction_text(shape: tuple[int, ...]) -> Callable[[float, float], str]:

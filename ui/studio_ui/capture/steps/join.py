@@ -54,7 +54,7 @@ class JoinStep(StepForm):
             return None
         self.turn_tool.size = (stitched.light.shape[1], stitched.light.shape[0])
         return Shown(
-            "joined", "Joined", stitched.light, self.marks(stitched, lambda: _marks(stitched)), around=True
+            "joined", "Joined", stitched.light, self.marks((stitched,), lambda: _marks(stitched)), around=True
         )
 
     def turned(self) -> F64 | None:

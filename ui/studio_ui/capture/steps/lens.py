@@ -15,7 +15,7 @@ from studio_core.shading.job import Job
 from studio_ui.ask import Ask, Filter
 from studio_ui.capture.desk import CaptureDesk
 from studio_ui.capture.preview.picture import Shown
-from studio_ui.capture.steps.step import StepForm, circle_of, lens_shown, named
+from studio_ui.capture.steps.step import StepForm, circle_of, named
 from studio_ui.capture.tools.circle_tool import CircleTool
 from studio_ui.context import Context
 from studio_ui.forms.fields import TextField
@@ -126,7 +126,7 @@ class LensStep(StepForm):
 
     def picture(self, name: str) -> Shown | None:
         """The light that the circle lies in."""
-        return lens_shown(self.desk, name.lower())
+        return self.lens_shown(name.lower())
 
     def shown(self, name: str) -> None:
         """The circle of that side."""

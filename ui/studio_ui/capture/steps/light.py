@@ -12,7 +12,7 @@ from studio_core.capturing.artifacts import CaptureState, Motion
 from studio_ui.capture.desk import CaptureDesk
 from studio_ui.capture.preview.picture import Shown
 from studio_ui.capture.steps.curve_plot import CurvePlot
-from studio_ui.capture.steps.step import StepForm, lens_shown, named
+from studio_ui.capture.steps.step import StepForm, named
 from studio_ui.context import Context
 from studio_ui.look.theme import Theme
 from studio_ui.panels.panel import heading, note
@@ -49,9 +49,9 @@ def motion_text(motion: Motion) -> str:
     """Pixels and degrees, or that it could not be told."""
     if not motion.trusted:
         return "not aligned"
-    if motion == Motion(correlation=motion.correlation):
-        return "–"
-    return f"{math.hypot(motion.dx, motion.dy):.1f} px, {abs(motion.degrees):.1f}°"
+    shift, turn = math.hypot(motion.dx, motion.dy), math.hypot(motion.degrees, *motion.rotation)
+    parts = ([f"{shift:.1f} px"] if shift else []) + ([f"{turn:.2f}°"] if turn else [])
+    return ", ".join(parts) or "–"
 
 
 class LightStep(StepForm):
@@ -95,10 +95,7 @@ class LightStep(StepForm):
             self.told.setText("")
         else:
             how = "Measured from the exposures" if response.measured else "Assumed"
-            noise = response.noise[0] ** 0.5
-            self.told.setText(
-                f"{how}; {response.rms:.3f} stops RMS unexplained; noise in the dark {100 * noise:.2g} %"
-            )
+            self.told.setText(f"{how}; {response.rms:.3f} stops RMS unexplained")
 
     def pictures(self) -> list[str]:
         """Sides."""
@@ -106,7 +103,7 @@ class LightStep(StepForm):
 
     def picture(self, name: str) -> Shown | None:
         """Merged light, with what no exposure resolved."""
-        return lens_shown(self.desk, name.lower())
+        return self.lens_shown(name.lower())
 
     def _fill(self) -> None:
         rows = exposure_rows(self.desk.state)

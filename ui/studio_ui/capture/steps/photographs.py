@@ -44,6 +44,7 @@ _TIPS = (
     "What the photograph says of time, sensitivity and aperture",
 )
 _THUMBNAIL = QSize(48, 32)
+_ROWS = 8  # that the table is high, at most
 _AUTOMATIC = "as found"
 
 
@@ -189,6 +190,12 @@ class PhotographsStep(StepForm):
         """The photographs that have been read, by name."""
         return self._names()
 
+    def first(self) -> str:
+        """One that is neither dark nor bright."""
+        names = self._names()
+        front = sum(found.side == self.rows[0].side for found in self.rows) if self.rows else 0
+        return names[front // 2] if names else ""
+
     def picture(self, name: str) -> Shown | None:
         """As the camera wrote it."""
         digest = self._digests().get(name, "")
@@ -236,6 +243,8 @@ class PhotographsStep(StepForm):
         for column in range(self.table.columnCount()):
             self.table.resizeColumnToContents(column)
         self.table.setColumnWidth(NAME, min(self.table.columnWidth(NAME), 190))
+        line = self.table.sizeHintForRow(0) if rows else 0
+        self.table.setMinimumHeight(max(200, min(len(rows), _ROWS) * line + 60))
 
     def _fill(self, item: QTreeWidgetItem, found: Row) -> None:
         item.setText(NAME, found.kept.facts.name or "Photograph")

@@ -11,7 +11,7 @@ from studio_core.capturing.settings import FRONT, OTHER_LENS, RING, SIDES, Patch
 from studio_core.params import ParamInfo, Value
 from studio_ui.capture.desk import CaptureDesk
 from studio_ui.capture.preview.picture import Shown
-from studio_ui.capture.steps.step import StepForm, circle_of, lens_of, lens_shown, named
+from studio_ui.capture.steps.step import StepForm, fitted_circle, lens_of, named
 from studio_ui.capture.steps.table import Table
 from studio_ui.capture.tools.ring_tool import RingTool
 from studio_ui.context import Context
@@ -124,7 +124,7 @@ class ReflectionsStep(StepForm):
         self.ring.patches = tuple(patch for patch in patches if patch.side == self.side)
         mine = [i for i, patch in enumerate(patches) if patch.side == self.side]
         self.ring.chosen = mine.index(self.index) if self.index in mine else -1
-        self.ring.lens, self.ring.circle = lens_of(self.desk), circle_of(self.desk, self.side)
+        self.ring.lens, self.ring.circle = lens_of(self.desk), fitted_circle(self.desk, self.side)
 
     def pictures(self) -> list[str]:
         """Sides."""
@@ -136,8 +136,8 @@ class ReflectionsStep(StepForm):
         light = self.desk.state.lights.get(side)
         after = found.lights.get(side) if found is not None else None
         if light is None or after is None or after is light.light or after.shape != light.light.shape:
-            return lens_shown(self.desk, side)
-        return lens_shown(self.desk, side, after, light.light)
+            return self.lens_shown(side)
+        return self.lens_shown(side, after, light.light)
 
     def shown(self, name: str) -> None:
         """The rectangles of that side."""

@@ -17,7 +17,7 @@ from studio_ui.capture.desk import CaptureDesk
 from studio_ui.capture.preview.picture import Shown
 from studio_ui.capture.steps.calibration import direction_text, unresolved_marks
 from studio_ui.capture.steps.step import StepForm
-from studio_ui.capture.telling import report_rows
+from studio_ui.capture.telling import Line, report_lines
 from studio_ui.context import Context
 from studio_ui.panels.panel import heading, note, row
 
@@ -56,11 +56,12 @@ class ResultStep(StepForm):
         self.column.addLayout(row(self.use, self.save, self.cube))
         self.lit = note("")
         self.column.addWidget(self.lit)
+        self.notes = note("")
+        self.column.addWidget(self.notes)
         self.column.addWidget(heading("In numbers"))
         self.table = QTreeWidget()
         self.table.setAccessibleName("Report")
         self.table.setHeaderLabels(["What", "Value"])
-        self.table.setRootIsDecorated(False)
         self.table.setMinimumHeight(240)
         self.table.header().setSectionResizeMode(0, QHeaderView.ResizeMode.ResizeToContents)
         self.column.addWidget(self.table)
@@ -85,10 +86,9 @@ class ResultStep(StepForm):
             return
         self._captured, self._cross = captured, None
         self.table.clear()
+        self.notes.setText("\n".join(dict.fromkeys(captured.notes)) if captured is not None else "")
         if captured is not None:
-            self.table.addTopLevelItems(
-                [QTreeWidgetItem(list(found)) for found in report_rows(captured.report)]
-            )
+            self.table.addTopLevelItems([_item(line) for line in report_lines(captured.report)])
 
     def pictures(self) -> list[str]:
         """Around, and the cube."""
@@ -104,7 +104,7 @@ class ResultStep(StepForm):
                 self._cross = unfolded(captured.faces)
             return Shown("cube", f"Cube of {captured.faces.shape[1]}", self._cross)
         pixels = captured.environment.pixels
-        marks = self.marks(captured, lambda: unresolved_marks(captured))
+        marks = self.marks((captured,), lambda: unresolved_marks(captured))
         return Shown("finished", AROUND, pixels, marks, say=direction_text(pixels.shape), around=True)
 
     def light(self) -> None:
@@ -164,3 +164,10 @@ def unfolded(faces: Faces) -> Faces:
     from studio_core.imaging.cubemap import joined, to_opengl
 
     return np.ascontiguousarray(joined(to_opengl(faces), "cross"))
+
+
+def _item(line: Line) -> QTreeWidgetItem:
+    made = QTreeWidgetItem([line.name, line.value])
+    made.setToolTip(1, line.value)
+    made.addChildren([_item(below) for below in line.below])
+    return made

@@ -39,7 +39,7 @@ class StepForm(QWidget):
         self.redraw: Callable[[], object] = lambda: None
         self.tool = Tool()
         self.forms: dict[str, ParamForm] = {}
-        self._marks: tuple[object, tuple[Mark, ...]] = (None, ())
+        self._marks: tuple[tuple[object, ...], tuple[Mark, ...]] = ((), ())
         self.column = QVBoxLayout(self)
         self.column.setContentsMargins(0, 0, 0, 0)
         self.column.setSpacing(GAP)
@@ -65,15 +65,35 @@ class StepForm(QWidget):
     def set_theme(self, theme: Theme) -> None:
         """Another theme."""
 
-    def marks(self, source: object, make: Callable[[], tuple[Mark, ...]]) -> tuple[Mark, ...]:
-        """Masks that are made from a result, once for each."""
-        if self._marks[0] is not source:
-            self._marks = (source, make())
-        return self._marks[1]
+    def marks(self, key: tuple[object, ...], make: Callable[[], tuple[Mark, ...]]) -> tuple[Mark, ...]:
+        """Masks that are made from results, once for each."""
+        old, marks = self._marks
+        if len(old) != len(key) or any(a is not b for a, b in zip(old, key, strict=True)):
+            self._marks = key, marks = key, make()
+        return marks
+
+    def lens_shown(
+        self,
+        side: str,
+        pixels: npt.NDArray[Any] | None = None,
+        before: npt.NDArray[Any] | None = None,
+    ) -> Shown | None:
+        """The light of one side (or other pixels of it), with the lens' angles at every point."""
+        light = self.desk.state.lights.get(side)
+        if light is None:
+            return None
+        found = self.desk.state.circles.get(side)
+        marks = self.marks((light, found), lambda: light_marks(light, found.circle if found else None))
+        shown = light.light if pixels is None else pixels
+        return Shown(side, side.capitalize(), shown, marks, before, angles(self.desk, side))
 
     def pictures(self) -> list[str]:
         """Names of what can be looked at now."""
         return []
+
+    def first(self) -> str:
+        """The one that is looked at before another one is chosen."""
+        return next(iter(self.pictures()), "")
 
     def picture(self, name: str) -> Shown | None:
         """One of them."""
@@ -83,27 +103,18 @@ class StepForm(QWidget):
         """The preview shows it now: the tool is for that one."""
 
 
-def light_marks(light: LensLight) -> tuple[Mark, ...]:
-    """What no exposure resolves, and what moved."""
+def light_marks(light: LensLight, circle: Circle | None) -> tuple[Mark, ...]:
+    """What no exposure resolves, and what moved, inside the lens' circle."""
+    inside: npt.NDArray[np.bool_] | np.bool_ = np.bool_(True)
+    if circle is not None:
+        height, width = light.light.shape[:2]
+        x, y = np.arange(width) + 0.5 - circle.x, np.arange(height) + 0.5 - circle.y
+        inside = x * x + (y * y)[:, None] < circle.radius**2
     return (
-        Mark("Clipped", light.clipped, CLIPPED, "Brighter than any exposure resolves"),
-        Mark("Dark", light.dark, DARK_COLOUR, "Darker than any exposure resolves", shown=False),
-        Mark("Moved", light.moved, MOVED, "Taken from one exposure alone, because something moved"),
+        Mark("Clipped", light.clipped & inside, CLIPPED, "Brighter than any exposure resolves"),
+        Mark("Dark", light.dark & inside, DARK_COLOUR, "Darker than any exposure resolves", shown=False),
+        Mark("Moved", light.moved & inside, MOVED, "Exposures were left out, because something moved"),
     )
-
-
-def lens_shown(
-    desk: CaptureDesk,
-    side: str,
-    pixels: npt.NDArray[Any] | None = None,
-    before: npt.NDArray[Any] | None = None,
-) -> Shown | None:
-    """The light of one side, with the lens' angles at every point."""
-    light = desk.state.lights.get(side)
-    if light is None:
-        return None
-    shown = light.light if pixels is None else pixels
-    return Shown(side, side.capitalize(), shown, light_marks(light), before, angles(desk, side))
 
 
 def lens_of(desk: CaptureDesk) -> Lens | None:
@@ -127,9 +138,16 @@ def circle_of(desk: CaptureDesk, side: str) -> Circle | None:
     return found.circle if found is not None else None
 
 
+def fitted_circle(desk: CaptureDesk, side: str) -> Circle | None:
+    """The circle that the lens is looked through: moved so that both lenses fit together."""
+    registration = desk.state.registration
+    moved: Circle | None = getattr(registration, side, None) if registration is not None else None
+    return moved if moved is not None else circle_of(desk, side)
+
+
 def angles(desk: CaptureDesk, side: str) -> Callable[[float, float], str]:
     """Words for a point of a lens' picture."""
-    lens, circle = lens_of(desk), circle_of(desk, side)
+    lens, circle = lens_of(desk), fitted_circle(desk, side)
 
     def say(x: float, y: float) -> str:
         if lens is None or circle is None:
