@@ -359,27 +359,23 @@ class PictureView(QWidget):
         """The whole picture coarsely, each sample where the turning brings it from."""
         assert self.turning is not None
         width, height = shown.size
-        x = np.linspace(*self._edges(0), _TURNED, endpoint=False)
-        y = np.linspace(
-            *self._edges(1), max(2, round(_TURNED * self.height() / max(self.width(), 1))), endpoint=False
-        )
-        x, y = x + (x[1] - x[0]) / 2, y + (y[1] - y[0]) / 2
-        inside = (y >= 0) & (y < height)
-        columns = (x >= 0) & (x < width)
-        pyramid = self._pyramids[id(shown.pixels)]
+        left, right = self._edges(0, width)
+        top, bottom = self._edges(1, height)
+        if right <= left or bottom <= top:
+            return
+        x = _middles(left, right, _TURNED)
+        y = _middles(top, bottom, max(2, round(_TURNED * (bottom - top) / (right - left))))
         level = max(0, int(np.log2(max(width / (2 * _TURNED), 1))))
-        small = pyramid.part(Part(level, 0, 0, width >> level, height >> level))
-        pixels = np.zeros((len(y), len(x), 3), small.dtype)
-        pixels[np.ix_(inside, columns)] = turned(small, self.turning, x[columns] / width, y[inside] / height)
-        made = displayed(pixels, self.exposure)
-        image = _qimage(made)
-        corner, end = self.to_widget(x[0], y[0]), self.to_widget(x[-1], y[-1])
+        part = Part(level, 0, 0, width >> level, height >> level)
+        small = self._pyramids[id(shown.pixels)].part(part)
+        image = _qimage(displayed(turned(small, self.turning, x / width, y / height), self.exposure))
         painter.setRenderHint(QPainter.RenderHint.SmoothPixmapTransform)
-        painter.drawImage(QRectF(corner, end), image)
+        painter.drawImage(QRectF(self.to_widget(left, top), self.to_widget(right, bottom)), image)
 
-    def _edges(self, axis: int) -> tuple[float, float]:
+    def _edges(self, axis: int, size: int) -> tuple[float, float]:
+        """The first and last of the picture that is seen, along x (0) or y (1)."""
         first, last = self.to_picture(QPointF(0, 0)), self.to_picture(QPointF(*self.extent))
-        return first[axis], last[axis]
+        return max(first[axis], 0.0), min(last[axis], float(size))
 
     def _target(self, part: Part) -> QRectF:
         step = 1 << part.level
@@ -414,3 +410,8 @@ def _qimage(pixels: npt.NDArray[np.uint8]) -> QImage:
     return QImage(
         np.ascontiguousarray(pixels).data, width, height, 3 * width, QImage.Format.Format_RGB888
     ).copy()
+
+
+def _middles(first: float, last: float, count: int) -> npt.NDArray[np.float64]:
+    """The middles of `count` equal parts."""
+    return first + (np.arange(count) + 0.5) * (last - first) / count
