@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from studio_core.imaging.curve_spline import KNOTS, basis, knot_logs, ordinary_shapes
+from studio_core.imaging.curve_spline import KNOTS, basis, knot_logs, ordinary_shapes, usual_scale
 from studio_core.imaging.exposure_check import shared_scale
 
 F64 = npt.NDArray[np.float64]
@@ -137,11 +137,14 @@ class _System:
         guess = np.zeros(self.first_tint - self.curves)
         value = 0.0
         for first, s in zip(self.first_ev[:-1] - self.curves, self.samples, strict=True):
+            seen = (s.fair[1:] & s.fair[:-1]).sum(axis=(1, 2))
             for k in np.flatnonzero(linked(s)):
                 step = _rough_step(s, int(k))
-                guess[first + k] -= step
-                guess[first + k + 1] += step
-                value += step**2
+                # by how much is seen of it: else a dark exposure runs away, and the others come together
+                weight = float(seen[k] / seen.max())
+                guess[first + k] -= weight * step
+                guess[first + k + 1] += weight * step
+                value += weight * step**2
         if not value > 0:
             return
         columns = [slice(self.curves, self.first_tint)]
@@ -160,6 +163,7 @@ class _System:
                 [s.listed for s in self.samples],
                 [s.certain for s in self.samples],
                 [linked(s) for s in self.samples],
+                usual_scale(np.cumsum(x[: self.curves].reshape(3, KNOTS), axis=1)),
             )
             self.pins[0] = (self.pins[0][0], self.pins[0][1] * (scale or 1.0))
 

@@ -31,11 +31,13 @@ def find_levels(frames: Sequence[npt.NDArray[Any]], evs: Sequence[float]) -> Lev
     """Levels of frames (H, W, 3) of one camera, uint8, uint16 or float32 (linear), with their listed EV."""
     tops = {np.dtype(np.uint8): 255.0, np.dtype(np.uint16): 65535.0}
     top = tops.get(frames[0].dtype) or max(_largest(frame) for frame in frames)
-    order = np.argsort(np.asarray(evs), kind="stable")
     black, white = [], []
     # bytes fall into every second bin otherwise
     bins = 256 if frames[0].dtype == np.uint8 else BINS
-    thin = [_thinned(frames[i]) for i in order]
+    thin = [_thinned(frame) for frame in frames]
+    # by what they show: what is listed may be wrong
+    order = np.argsort([float(np.nan_to_num(frame, posinf=top).mean()) for frame in thin], kind="stable")
+    thin = [thin[i] for i in order]
     sorted_evs = np.asarray(evs, np.float64)[order]
     for channel in range(3):
         counts = np.stack([_histogram(frame[..., channel], top, bins) for frame in thin])
@@ -67,7 +69,7 @@ def _pedestal(counts: F64, evs: F64) -> float:
         np.cumsum(counts, axis=1) >= np.maximum(20, 1e-3 * counts.sum(1, keepdims=True)), axis=1
     )
     darkest = 0
-    apart = np.flatnonzero(evs >= evs[darkest] + 0.7)
+    apart = np.flatnonzero(np.abs(evs - evs[darkest]) >= 0.7)
     if not len(apart) or not 0.01 * bins <= floors[darkest] <= 0.2 * bins:
         return 0.0
     brighter = int(apart[0])
@@ -94,7 +96,7 @@ def _clipping(counts: F64, evs: F64) -> float:
     edge = max(highest - round(0.02 * bins), 0)
     agree = (
         len(reach) > 1
-        and evs[reach[-1]] - evs[reach[0]] >= 0.5
+        and abs(evs[reach[-1]] - evs[reach[0]]) >= 0.5
         and above[reach[-1], edge] > 1.2 * above[reach[0], edge]  # more light clips more
     )
     if not at_end and not agree:

@@ -16,7 +16,7 @@ import numpy.typing as npt
 from studio_core.capturing.artifacts import Bracket, Exposures, Motion, Response
 from studio_core.errors import InputError
 from studio_core.imaging.curve_fit import FEWEST, Fit, Sample, fit, linked
-from studio_core.imaging.curve_spline import basis
+from studio_core.imaging.curve_spline import basis, usual_scale
 from studio_core.imaging.exposure_check import compared, shared_scale
 from studio_core.imaging.levels import Levels, find_levels
 from studio_core.imaging.projection import Circle, Lens
@@ -80,7 +80,7 @@ def solve_response(
     if measure:
         scale = 1.0
         if exposures == MEASURED:
-            scale, note = _scale(made, samples, levels, count)
+            scale, note = _scale(made, samples)
             notes += note
         curve = _levels_of(made, scale, levels, count)
         made = replace(
@@ -126,7 +126,9 @@ def _sample(bracket: Bracket, tiles: Tiles, levels: Levels, rounding: float) -> 
     number = (some.number - black) / (white - black)
     # a hand's rest of motion, the mean's noise, and what rounding leaves where noise does not spread it
     spread = np.sqrt(some.variance / some.size**2 + (0.3 * some.slant) ** 2 + rounding / 4)
-    fair = some.fair & (number > 0) & (number < 1)
+    # a number that noise could make of nothing says nothing, and its logarithm much
+    clear = some.number - black > np.maximum(4 * spread, 1.5 / 255)
+    fair = some.fair & clear & (number < 1)
     return Sample(
         number[order], (spread / (white - black))[order], fair[order],
         np.asarray(bracket.listed, np.float64)[order], np.asarray(bracket.certain, np.bool_)[order],
@@ -181,21 +183,23 @@ def _relative(curve: F64, levels: Levels) -> F64:
     return made
 
 
-def _scale(made: Fit, samples: Mapping[str, Sample], levels: Levels, count: int) -> tuple[float, list[str]]:
+def _scale(made: Fit, samples: Mapping[str, Sample]) -> tuple[float, list[str]]:
     """What brings solved steps to listed ones, or else the curve to sRGB's."""
     some = list(samples.values())
-    scale = shared_scale(
-        made.evs, [s.listed for s in some], [s.certain for s in some], [linked(s) for s in some]
-    )
-    if scale is not None:
-        return scale, []
-    number = np.linspace(0.1, 0.9, 81)
+    seen = [linked(s) for s in some]
     assert made.curve is not None
-    own = (basis(number) @ made.curve.T).mean(axis=1)
-    usual = np.where(number <= 0.04045, number / 12.92, ((number + 0.055) / 1.055) ** 2.4)
-    return float(np.polyfit(own, np.log2(usual), 1)[0]), [
-        "No listed step says how far the exposures are apart: the curve is scaled to be like sRGB's."
-    ]
+    usual = usual_scale(made.curve)
+    scale = shared_scale(made.evs, [s.listed for s in some], [s.certain for s in some], seen, usual)
+    if scale is None:
+        return usual, [
+            "No listed step says how far the exposures are apart: as far as gives an ordinary camera's curve."
+        ]
+    if not any((s.certain[1:] & s.certain[:-1] & link).any() for s, link in zip(some, seen, strict=True)):
+        return scale, [
+            "How far the exposures are apart is a guess, and with it how much brighter lamps are than walls: "
+            "type the exposures where you know them."
+        ]
+    return scale, []
 
 
 def _levels_of(made: Fit, scale: float, levels: Levels, count: int) -> F64:

@@ -23,6 +23,7 @@ F64 = npt.NDArray[np.float64]
 _CANDIDATES = 9000
 _STRATA = 20
 _A_STRATUM = 4
+_EXPOSURES = 6  # of more, fewer places each
 _CELLS = 6  # a side
 
 
@@ -131,6 +132,7 @@ def choose(tiles: Tiles) -> npt.NDArray[np.int64]:
     roughness = np.where(useful, rough[best, places], np.inf)
     cell = _cells(len(places))
     taken = np.zeros(len(places), np.bool_)
+    each = int(np.clip(round(_EXPOSURES * _A_STRATUM / len(mean)), 1, _A_STRATUM))
     crowd = np.zeros(cell.max(initial=0) + 1)
     for frame in range(len(mean)):
         stratum = np.minimum((np.sqrt(np.clip(mean[frame], 0, 1)) * _STRATA).astype(np.int64), _STRATA - 1)
@@ -138,7 +140,7 @@ def choose(tiles: Tiles) -> npt.NDArray[np.int64]:
             here = np.flatnonzero(
                 (stratum == level) & tiles.fair[frame].any(axis=1) & np.isfinite(roughness) & ~taken
             )
-            for _ in range(min(_A_STRATUM, len(here))):
+            for _ in range(min(each, len(here))):
                 pick = here[np.argmin(roughness[here] * (1 + 0.15 * crowd[cell[here]]))]
                 taken[pick] = True
                 crowd[cell[pick]] += 1

