@@ -257,7 +257,9 @@ def _rough(
 
 def _of_circles(circles: Mapping[str, FoundCircle]) -> tuple[str, ...]:
     return tuple(
-        f"The {side} lens' circle was not found for certain: look at it."
+        f"No circle is seen in the {side} pictures: the lens was taken to fill them from corner to corner."
+        if one.confidence == 0
+        else f"The {side} lens' circle was not found for certain: look at it."
         for side, one in circles.items()
         if one.confidence < _UNSURE
     )

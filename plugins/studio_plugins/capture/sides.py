@@ -15,6 +15,8 @@ from studio_plugins.capture.progress import StageJob
 
 _AROUND = 0.06
 """Kept around a circle that is cut out, of its radius."""
+_NONE = 0.1
+"""Confidence below which there is no circle: the lens fills the picture, and is at home in its corners."""
 
 
 def cut_out(brackets: Brackets, job: Job) -> tuple[dict[str, Bracket], dict[str, FoundCircle]]:
@@ -29,8 +31,14 @@ def cut_out(brackets: Brackets, job: Job) -> tuple[dict[str, Bracket], dict[str,
     found = {}
     for place, (side, bracket) in enumerate(brackets.sides.items()):
         part = StageJob(job, place / len(brackets.sides), 1 / len(brackets.sides))
-        found[side] = find_circles([shot.pixels for shot in bracket.shots], 1, part)[0]
+        one = find_circles([shot.pixels for shot in bracket.shots], 1, part)[0]
+        found[side] = one if one.confidence >= _NONE else _whole(bracket)
     return dict(brackets.sides), found
+
+
+def _whole(bracket: Bracket) -> FoundCircle:
+    width, height = bracket.shots[0].size
+    return FoundCircle(Circle(width / 2, height / 2, math.hypot(width, height) / 2), 0.0)
 
 
 def _two(bracket: Bracket, job: Job) -> tuple[dict[str, Bracket], dict[str, FoundCircle]]:

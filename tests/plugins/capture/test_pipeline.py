@@ -219,3 +219,17 @@ def test_a_circle_by_hand_counts(after: FisheyeRun) -> None:
     nudged = Circle(drawn.x + 0.5, drawn.y, drawn.radius)
     after.run(_photographs(), replace(SMALL, lens=LensSettings(front=nudged)), Job("capture"))
     assert after.made[0] == "views", "a nudge merges nothing anew"
+
+
+def test_a_picture_without_a_circle_is_taken_whole(run: FisheyeRun) -> None:
+    rng = np.random.default_rng(2)
+    light = np.exp(rng.normal(size=(12, 16, 3))).repeat(16, 0).repeat(16, 1)
+    pictures = []
+    for i, ev in enumerate((-4.0, -2.0, 0.0)):
+        encoded = np.clip(light * 2.0**ev, 0, 1) ** (1 / 2.2)
+        pictures.append(
+            Photograph(np.rint(encoded * 255).astype(np.uint8), ShotFacts(f"{i}.png"), f"flat {i}")
+        )
+    state = run.run(pictures, SMALL, Job("capture"))
+    assert state.circles["front"].circle == Circle(128, 96, 160)
+    assert any("corner to corner" in note for note in state.notes)
