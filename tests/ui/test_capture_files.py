@@ -8,6 +8,8 @@ import pytest
 from capture_support import FakeCapturer, FakeRun, bracket, plugin
 from drag_support import Drag, files, on_canvas
 from PIL import Image as Pillow
+from PySide6.QtCore import QPoint, QPointF, Qt
+from PySide6.QtGui import QDragEnterEvent, QDropEvent
 from ui_support import Driver, Make, room
 
 from studio_core.imaging.photograph_read import PHOTOGRAPHS as READABLE
@@ -59,6 +61,30 @@ def test_dropped_photographs_become_a_capture(driver: Driver, shots: list[Path])
     assert driver.labels()[-1] == "Add capture"
     driver.do("edit.undo")
     assert captures(driver) == []
+
+
+def test_more_photographs_are_dropped_on_the_panel(driver: Driver, shots: list[Path]) -> None:
+    driver.window.take_files(shots[:3])
+    panel = driver.window.capture_panel
+    driver.until(lambda: len(captures(driver)) == 1 and panel.work is not None)
+    for paths, taken in ((shots, True), ([shots[0], Path("chair.obj")], False)):
+        data = files(*paths)
+        enter = QDragEnterEvent(
+            QPoint(20, 20), Qt.DropAction.CopyAction, data, Qt.MouseButton.LeftButton, Qt.KeyboardModifier(0)
+        )
+        panel.dragEnterEvent(enter)
+        assert enter.isAccepted() is taken
+    data = files(*shots)  # an event does not keep it
+    drop = QDropEvent(
+        QPointF(20, 20),
+        Qt.DropAction.CopyAction,
+        data,
+        Qt.MouseButton.LeftButton,
+        Qt.KeyboardModifier(0),
+    )
+    panel.dropEvent(drop)
+    driver.until(lambda: len(captures(driver)[0].photographs) == 6)
+    assert len(captures(driver)) == 1
 
 
 def test_a_no_leaves_everything_as_it_is(driver: Driver, shots: list[Path]) -> None:

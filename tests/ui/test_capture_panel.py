@@ -17,7 +17,7 @@ from ui_support import Driver, Make, room
 from studio_core.capturing.edits import add_capture
 from studio_core.capturing.settings import RING, CaptureSettings, Shot
 from studio_core.imaging.environment import load_environment
-from studio_core.imaging.projection import Circle, Lens
+from studio_core.imaging.projection import OCAM, Circle, Lens
 from studio_core.scene.capture import Capture
 from studio_core.scene.nodes import Environment
 from studio_core.shading.scheduler import InlineExecutor
@@ -175,6 +175,32 @@ def test_a_circle_is_dragged_nudged_and_found_again(wizard: Wizard, run: FakeRun
         wizard.driver.do("edit.undo")
     assert wizard.capture.settings == CaptureSettings()
     assert document.position == steps
+
+
+def test_a_lens_is_typed_and_imported(wizard: Wizard, tmp_path: Path) -> None:
+    form = wizard.go("lens")
+    form.falloff.fields["falloff"].spin.setValue(30)
+    assert wizard.capture.settings.lens.falloff == pytest.approx(0.3)
+    wizard.settle()
+    form.found_falloff.click()
+    assert wizard.capture.settings.lens.falloff is None
+    form.coefficients.sink.apply("coefficients", "0.1; x")
+    assert wizard.driver.problems() == ["'x' is no number"]
+    form.coefficients.sink.apply("coefficients", "0.1; -0.02")
+    assert wizard.capture.settings.lens.coefficients == (0.1, -0.02)
+    path = tmp_path / "calib_results.txt"
+    path.write_text(
+        "#polynomial\n5 -40 0 0.004 0 0\n#inverse\n2 60 30\n#centre\n45 60\n#affine\n1 0 0\n#size\n90 120\n"
+    )
+    wizard.driver.answers.files = [path]
+    form.load(path)
+    wizard.driver.idle()
+    lens = wizard.capture.settings.lens
+    assert lens.model == OCAM
+    assert not lens.fit_fov
+    assert lens.front is not None
+    assert lens.back is None
+    assert wizard.driver.labels()[-1] == "Import OCamCalib"
 
 
 def test_rectangles_are_drawn_moved_switched_and_taken_away(wizard: Wizard, run: FakeRun) -> None:
@@ -365,6 +391,7 @@ def test_a_cancelled_run_keeps_what_is_there(slow: Wizard, run: FakeRun) -> None
     assert desk.state.captured is before.captured
     assert "captured" not in desk.fresh
     assert not slow.go("result").use.isEnabled()
+    assert work.preview.view.remark == "from earlier settings"
     assert "Cancelled" in desk.error
     assert work.again.isVisible()
     run.gate.set()
@@ -372,6 +399,7 @@ def test_a_cancelled_run_keeps_what_is_there(slow: Wizard, run: FakeRun) -> None
     slow.settle()
     assert "captured" in desk.fresh
     assert desk.error == ""
+    slow.driver.until(lambda: work.preview.view.remark == "")
 
 
 def test_what_fails_is_told_where_it_failed(wizard: Wizard, run: FakeRun) -> None:

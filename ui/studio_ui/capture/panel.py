@@ -6,8 +6,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from PySide6.QtCore import QEvent, QSignalBlocker, Qt, QTimer
-from PySide6.QtGui import QHideEvent, QKeyEvent, QShowEvent
+from PySide6.QtCore import QEvent, QMimeData, QSignalBlocker, Qt, QTimer
+from PySide6.QtGui import QDragEnterEvent, QDropEvent, QHideEvent, QKeyEvent, QShowEvent
 from PySide6.QtWidgets import QDockWidget, QLabel, QPushButton, QWidget
 
 from studio_core.scene.capture import Capture
@@ -17,6 +17,7 @@ from studio_ui.ask import Ask
 from studio_ui.capture.desk import CaptureDesk
 from studio_ui.capture.reading import Reading
 from studio_ui.context import Context
+from studio_ui.files.drop_intent import CAMERAS, PHOTOGRAPHS, dropped_paths
 from studio_ui.forms.fields import Combo
 from studio_ui.look.theme import Theme
 from studio_ui.panels.panel import Panel, note
@@ -76,6 +77,7 @@ class CapturePanel(Panel):
         column.addStretch(1)
         self.column.addWidget(self.choice)
         self.column.addWidget(self.empty, 1)
+        self.setAcceptDrops(True)
         self._soon = QTimer(self)
         self._soon.setSingleShot(True)
         self._soon.timeout.connect(self.refresh)
@@ -109,6 +111,29 @@ class CapturePanel(Panel):
             event.accept()
             return True
         return super().event(event)
+
+    def dragEnterEvent(self, event: QDragEnterEvent) -> None:
+        """Photographs, also while the panel is a window of its own."""
+        if self._dropped(event.mimeData()):
+            event.setDropAction(Qt.DropAction.CopyAction)
+            event.accept()
+        else:
+            event.ignore()
+
+    def dropEvent(self, event: QDropEvent) -> None:
+        """More photographs of this room, or the first ones."""
+        paths = self._dropped(event.mimeData())
+        event.setDropAction(Qt.DropAction.CopyAction)
+        event.accept()
+        QTimer.singleShot(0, self, lambda: self.reading.take(paths, self.desk.node))
+
+    def _dropped(self, data: QMimeData) -> list[Path]:
+        """The photographs of a drag; none where it has other things, too."""
+        if not data.hasUrls():
+            return []
+        paths = dropped_paths(data) or []
+        known = {*PHOTOGRAPHS, *CAMERAS, ".tif", ".tiff"}
+        return paths if all(path.suffix.lower() in known for path in paths) else []
 
     def showEvent(self, event: QShowEvent) -> None:
         """Somebody looks: what is not up to date is computed."""

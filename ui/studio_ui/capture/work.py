@@ -148,6 +148,8 @@ class CaptureWork(QWidget):
         self.preview.scale = captured.calibration.luminance_scale if captured is not None else None
         self.form.show_now()
         self._show()
+        stale = now.mark in ("working", "waiting", "error") and self.step != "photographs"
+        self.preview.view.set_remark("from earlier settings" if stale else "")
         self.progress()
 
     def progress(self, task: Task | None = None) -> None:

@@ -62,6 +62,7 @@ class PictureView(QWidget):
         self.hidden: set[str] = set()  # names of marks
         self.wipe = 0.5
         self.wiping = True
+        self.remark = ""  # over the picture, say that it is an old one
         self.turning: npt.NDArray[np.float64] | None = None
         self._build = build
         self._pyramids: dict[int, Pyramid] = {}
@@ -114,6 +115,12 @@ class PictureView(QWidget):
         """All marks but these."""
         self.hidden = hidden
         self.update()
+
+    def set_remark(self, text: str) -> None:
+        """What is said over the picture; nothing for nothing."""
+        if text != self.remark:
+            self.remark = text
+            self.update()
 
     def set_tool(self, tool: Tool) -> None:
         """What a hand does."""
@@ -322,6 +329,10 @@ class PictureView(QWidget):
             self._paint(painter, shown)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         self.tool.paint(painter, self)
+        if self.remark:
+            wide = painter.fontMetrics().horizontalAdvance(self.remark) + 20
+            high = painter.fontMetrics().height() + 6
+            _pill(painter, QRectF(8, self.height() - high - 8, wide, high), self.remark)
         painter.end()
 
     def _paint(self, painter: QPainter, shown: Shown) -> None:
@@ -349,11 +360,7 @@ class PictureView(QWidget):
         for text, right in (("before", True), ("after", False)):
             wide = painter.fontMetrics().horizontalAdvance(text) + 12
             box = QRectF(at - wide - 6 if right else at + 6, 6, wide, painter.fontMetrics().height() + 4)
-            painter.setPen(Qt.PenStyle.NoPen)
-            painter.setBrush(QColor(20, 20, 20, 190))
-            painter.drawRoundedRect(box, 4, 4)
-            painter.setPen(QColor("#ffffff"))
-            painter.drawText(box, Qt.AlignmentFlag.AlignCenter, text)
+            _pill(painter, box, text)
 
     def _paint_turned(self, painter: QPainter, shown: Shown) -> None:
         """The whole picture coarsely, each sample where the turning brings it from."""
@@ -410,6 +417,15 @@ def _qimage(pixels: npt.NDArray[np.uint8]) -> QImage:
     return QImage(
         np.ascontiguousarray(pixels).data, width, height, 3 * width, QImage.Format.Format_RGB888
     ).copy()
+
+
+def _pill(painter: QPainter, box: QRectF, text: str) -> None:
+    """Text on a dark ground, readable on any picture."""
+    painter.setPen(Qt.PenStyle.NoPen)
+    painter.setBrush(QColor(20, 20, 20, 190))
+    painter.drawRoundedRect(box, 4, 4)
+    painter.setPen(QColor("#ffffff"))
+    painter.drawText(box, Qt.AlignmentFlag.AlignCenter, text)
 
 
 def _middles(first: float, last: float, count: int) -> npt.NDArray[np.float64]:

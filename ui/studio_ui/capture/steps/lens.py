@@ -32,6 +32,14 @@ _COEFFICIENTS = ParamInfo(
     "Coefficients",
     "k1, k2 … of Kannala and Brandt, or OCamCalib's polynomial in units of the circle's radius",
 )
+_FALLOFF = ParamInfo(
+    "number",
+    "Lost at edge",
+    "Light that does not arrive at the edge; found by itself",
+    "%",
+    0.0,
+    95.0,
+)
 _WITH_COEFFICIENTS = (KANNALA_BRANDT, OCAM)
 _OCAM_FILES = Filter("OCamCalib calibration", (".txt",))
 
@@ -69,6 +77,12 @@ class LensStep(StepForm):
         label: QLabel = form_label(_COEFFICIENTS.label, _COEFFICIENTS.doc, self.coefficients)
         layout.addRow(label, self.coefficients)
         self.column.addWidget(self._row)
+        self.falloff = ParamForm({"falloff": _FALLOFF}, _FalloffSink(self))
+        self.column.addWidget(self.falloff)
+        self.found_falloff = QPushButton("Find the loss")
+        self.found_falloff.setToolTip("Find how much light is lost at the edge from what both lenses see")
+        self.found_falloff.clicked.connect(lambda: desk.apply("lens", "Find the loss of light", falloff=None))
+        self.column.addLayout(row(self.found_falloff))
         load = QPushButton("Import OCamCalib…")
         load.setToolTip("The lens of a calibration file (calib_results.txt)")
         load.clicked.connect(self._import)
@@ -98,6 +112,11 @@ class LensStep(StepForm):
             self.found.setText("")
         self._row.setVisible(settings.lens.model in _WITH_COEFFICIENTS)
         self.coefficients.show_value(", ".join(f"{k:g}" for k in settings.lens.coefficients))
+        loss = settings.lens.falloff
+        if loss is None:
+            loss = -sum(registration.falloff) if registration is not None else 0.0
+        self.falloff.show_values({"falloff": 100 * min(max(loss, 0.0), 1.0)})
+        self.found_falloff.setEnabled(settings.lens.falloff is not None)
         for name in ("yaw", "pitch", "roll", "exposure"):
             self.forms["registration"].show_row(name, not settings.registration.automatic)
         if registration is None:
@@ -106,9 +125,6 @@ class LensStep(StepForm):
         lines = [f"Field of view {registration.lens.fov:.2f}°."]
         if registration.matches:
             lines.append(f"{registration.matches:,} places seen by both, {registration.spread:.2f}° apart.")
-        loss = -sum(registration.falloff)
-        if loss > 0:
-            lines.append(f"{100 * loss:.0f} % of light lost at the edge.")
         gain = ", ".join(f"{g:.3g}" for g in registration.gain)
         lines.append(f"Back times {gain} is front.")
         self.told.setText(" ".join(lines))
@@ -209,6 +225,22 @@ class _CircleSink:
             self._step.circle_tool.apply(circle)
 
 
+class _FalloffSink(_CircleSink):
+    """Percent, kept as a share."""
+
+    def begin(self, name: str) -> bool:
+        """A drag starts."""
+        return self._step.desk.begin("Light lost at the edge")
+
+    def preview(self, name: str, value: Value) -> None:
+        """The drag goes on."""
+        self._step.desk.preview("lens", "Light lost at the edge", falloff=_share(value))
+
+    def apply(self, name: str, value: Value) -> None:
+        """One step."""
+        self._step.desk.apply("lens", "Light lost at the edge", falloff=_share(value))
+
+
 class _CoefficientSink(_CircleSink):
     """Numbers with commas between them."""
 
@@ -222,6 +254,11 @@ class _CoefficientSink(_CircleSink):
             step.show_now()
             return
         step.desk.apply("lens", "Coefficients of the lens", coefficients=found)
+
+
+def _share(percent: Value) -> float:
+    assert isinstance(percent, int | float)
+    return round(percent / 100, 4)
 
 
 def numbers_of(text: str) -> tuple[float, ...]:
