@@ -25,7 +25,7 @@ HALF_TURN = np.diag([-1.0, 1.0, -1.0])
 """The finished picture's frame from the front lens' frame when nothing is levelled or turned."""
 _TILE = (128, 256)
 _BORDER = 4
-_LEVEL_WIDTH = 2048
+_LEVEL_WIDTH = 1280
 _NOT_QUITE = 0.04
 
 
