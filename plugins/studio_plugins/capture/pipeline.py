@@ -33,6 +33,7 @@ from studio_core.errors import InputError
 from studio_core.imaging.photograph import Photograph
 from studio_core.imaging.projection import Circle, Lens
 from studio_core.shading.job import Job
+from studio_plugins.capture.level import Level
 from studio_plugins.capture.progress import Kept, StageJob
 
 T = TypeVar("T")
@@ -45,7 +46,8 @@ _SHARES = {
     "views": 0.01,
     "registration": 0.12,
     "reflections": 0.05,
-    "stitch": 0.16,
+    "level": 0.04,
+    "stitch": 0.12,
     "calibration": 0.02,
 }
 STAGES = tuple(_SHARES)
@@ -153,6 +155,9 @@ class _Pass:
     # -- light of each lens → one calibrated picture
 
     def _picture(self) -> None:
+        from studio_plugins.capture.result import captured
+        from studio_plugins.capture.stitch import level_of, stitch, stitch_equirectangular
+
         wanted, lights, circles = self._settings, self._state.lights, self._state.circles
         lens, layout = _lens(wanted.lens), self._state.brackets.layout if self._state.brackets else ""
         views = self._stage(
@@ -177,14 +182,23 @@ class _Pass:
         self._tell(reflections=reflections, notes=reflections.notes)
         self._reached("reflections")
 
+        workers, clean_views = self._services.workers, _clean(views, reflections)
+        wants_level = wanted.stitch.level and layout != EQUIRECTANGULAR
+
+        def upright(job: Job) -> Level | None:
+            return level_of(clean_views, registration, job, workers) if wants_level else None
+
+        # found once, however the picture is turned afterwards
+        level = self._stage("level", (views, registration, reflections, wants_level), upright)
+
         def join(job: Job) -> Stitched:
-            return _joined(views, registration, reflections, wanted, layout, job, self._services.workers)
+            if layout == EQUIRECTANGULAR:
+                return stitch_equirectangular(clean_views[FRONT], wanted.stitch, job, workers)
+            return stitch(clean_views, registration, wanted.stitch, job, workers, level)
 
         stitched = self._stage("stitch", (views, registration, reflections, wanted.stitch), join)
         self._tell(stitched=stitched, notes=stitched.notes)
         self._reached("stitch")
-
-        from studio_plugins.capture.result import captured
 
         state = self._state
         result = self._stage(
@@ -371,21 +385,8 @@ def _without_reflections(
     return remove(through, registration, patches, StageJob(job, 0.5, 0.5))
 
 
-def _joined(
-    views: Mapping[str, View],
-    registration: Registration | None,
-    reflections: Reflections,
-    settings: CaptureSettings,
-    layout: str,
-    job: Job,
-    workers: Any,
-) -> Stitched:
-    from studio_plugins.capture.stitch import stitch, stitch_equirectangular
-
-    clean = {side: dataclasses.replace(view, light=reflections.lights[side]) for side, view in views.items()}
-    if layout == EQUIRECTANGULAR:
-        return stitch_equirectangular(clean[FRONT], settings.stitch, job, workers)
-    return stitch(clean, registration, settings.stitch, job, workers)
+def _clean(views: Mapping[str, View], reflections: Reflections) -> dict[str, View]:
+    return {side: dataclasses.replace(view, light=reflections.lights[side]) for side, view in views.items()}
 
 
 CAPTURER = FisheyeCapturer()
