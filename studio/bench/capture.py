@@ -126,6 +126,15 @@ def read_map(path: Path) -> F32:
     return image.pixels
 
 
+def deep_arcs(phone: Phone, seed: int) -> Phone:
+    """The same with a narrower lens, and arcs that reach 2 … 4° across the seam: others are cut off by it."""
+    rng = np.random.default_rng([seed, 8])
+    lens = phone.lens.with_fov(min(phone.lens.fov, float(rng.uniform(190, 197))))
+    depths = lens.fov / 2 - 90 + rng.uniform(2, 4, len(phone.arcs))
+    arcs = tuple(replace(arc, depth=float(d)) for arc, d in zip(phone.arcs, depths, strict=True))
+    return replace(phone, lens=lens, arcs=arcs)
+
+
 def ladder_of(room: F32, phone: Phone) -> tuple[float, ...]:
     """The first ladder whose darkest exposure clips less than `COVERED` of the energy, or the last."""
     fitting = (evs for evs in LADDERS if covered(room, replace(phone, evs=evs)))
@@ -194,7 +203,9 @@ def _over_phones(
     found: dict[tuple[str, str], list[float]] = {}
     details: dict[str, list[dict[str, object]]] = {}
     for seed in range(setup.phones):
-        drawn = random_phone(100 * index + seed, tuned=False, radius=setup.radius, reflections=True)
+        drawn = deep_arcs(
+            random_phone(100 * index + seed, False, radius=setup.radius, reflections=True), seed
+        )
         drawn = replace(drawn, evs=ladder_of(room, drawn))
         shots: Shots | None = None
         within = dimmed(room, drawn)
@@ -266,6 +277,7 @@ UNITS = {
     "pixel_log2_p95": "stop",
     "registration_deg": "°",
     "fov_error": "°",
+    "arcs_log2_mean": "stop",
     "response_log2": "stop",
     "exposure_ev_max": "EV",
 }
@@ -286,6 +298,7 @@ def measured(
         "pixel_log2_median": pixels.median,
         "pixel_log2_p95": pixels.p95,
         "compared": pixels.share,
+        "arcs_log2_mean": pixels.arcs,
         "exposure_ev_max": measure.exposure_error(state, truth),
         "nonfinite": float(measure.nonfinite(state)),
     }

@@ -12,9 +12,10 @@ from studio.bench.phone import Truth
 from studio.bench.phone_optics import look_up
 from studio.bench.phone_response import Curve
 from studio_core.capturing.artifacts import CaptureState, Response
-from studio_core.capturing.settings import SIDES
+from studio_core.capturing.settings import BACK, SIDES
 from studio_core.colour import LUMINANCE as WEIGHTS
 from studio_core.imaging.latlong import equirect_direction, pixel_solid_angles
+from studio_core.imaging.projection import project
 
 F32 = npt.NDArray[np.float32]
 LUMINANCE = np.array(WEIGHTS)
@@ -54,11 +55,15 @@ def irradiance_error(made: F32, truth: F32, finished_from_room: F64) -> float:
 
 @dataclass(frozen=True)
 class PixelError:
-    """Median and 95th percentile of |log2| outside the seam; share of the sphere that was compared."""
+    """Median and 95th percentile of |log2| outside the seam; share of the sphere that was compared.
+
+    `arcs`: mean of log2 where an arc brightens a lens that looks there (less than 90° off its axis).
+    """
 
     median: float
     p95: float
     share: float
+    arcs: float = 0.0
 
 
 def pixel_error(
@@ -90,7 +95,24 @@ def pixel_error(
     off = np.abs(ratio[fine] - middle)
     order = np.argsort(off)
     median, p95 = (_quantile(off[order], weights[fine][order], q) for q in (0.5, 0.95))
-    return PixelError(median, p95, float(weights[fine].sum() / weights.sum()))
+    under = ~spoilt & under_arcs(room, truth)
+    arcs = float(np.average(ratio[under] - middle, weights=weights[under])) if under.any() else 0.0
+    return PixelError(median, p95, float(weights[fine].sum() / weights.sum()), arcs)
+
+
+def under_arcs(room: F64, truth: Truth) -> npt.NDArray[np.bool_]:
+    """Of directions of the room (N, 3): where the lens in front of which they lie has over 0.3 stops more."""
+    made = np.zeros(len(room), bool)
+    for side in SIDES:
+        lens_way = room @ truth.room_from_front
+        if side == BACK:
+            lens_way = lens_way @ truth.rotation
+        one = truth.side(side)
+        points, seen = project(truth.phone.lens, one.circle, lens_way)
+        height, width = one.stops.shape
+        x, y = (np.clip(points[:, k].astype(int), 0, n - 1) for k, n in ((0, width), (1, height)))
+        made |= seen & (lens_way[:, 2] < 0) & (one.stops[y, x] > 0.3)
+    return made
 
 
 def _calmed(light: F32, resolution: int) -> F32:
