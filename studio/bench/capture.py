@@ -91,7 +91,13 @@ def run(report: Report, program: Headless) -> None:
 
 
 def _others(report: Report, program: Headless, setup: Setup, maps: Mapping[str, Path]) -> None:
-    from studio.bench import capture_brackets, capture_clone, capture_pipeline, capture_reflections
+    from studio.bench import (
+        capture_brackets,
+        capture_clone,
+        capture_pipeline,
+        capture_reflections,
+        capture_removal,
+    )
 
     if report.wants("brackets") and maps:
         rooms = {name: read_map(path) for name, path in maps.items()}
@@ -101,6 +107,11 @@ def _others(report: Report, program: Headless, setup: Setup, maps: Mapping[str, 
         with program.job("reflections") as job:
             rooms = {name: read_map(path) for name, path in maps.items()}
             capture_reflections.measure(report, job, rooms, setup.captures)
+        report.keep()
+    if report.wants(capture_removal.CASE) and maps:
+        with program.job(capture_removal.CASE) as job:
+            rooms = {name: read_map(path) for name, path in maps.items()}
+            capture_removal.measure(report, job, rooms, setup.captures)
         report.keep()
     if report.wants("clone"):
         capture_clone.measure(report, setup.clone)

@@ -32,7 +32,8 @@ _AT_MOST = 0.5  # stops: a larger difference counts as this
 _TIE = 0.02  # stops for the largest shift, so that it is 0 where nothing tells
 _PLAUSIBLE = (1.25, 0.01)  # of the least difference, and stops
 _DEPTHS = (2.5, 4.0, 6.0, 8.0)  # degrees from the frame: a reflection fills one of these
-_EDGE = 0.5  # degrees at the very edge that are left out
+EDGE = 1.0
+"""Degrees at the very edge that are left out: the rim's shadow falls there."""
 _BASE = 0.7  # of what is too bright far from the frame is no reflection of the frame
 _FLOOR = 1e-3  # of the median light: darker is as dark
 
@@ -111,7 +112,8 @@ def _unrolled(own: View, other: View, registration: Registration, side: str) -> 
     _, away = angles(way)
     raw, own_seen = look(own, ring.directions)
     raw_other, other_seen = look(other, way)
-    own_seen[rows:] = False
+    own_seen[rows - _pixels(EDGE) :] = False
+    other_seen &= away <= other.lens.half - math.radians(EDGE)
     if not (own_seen & other_seen).any():
         return None
     light = raw / falloff_at(registration, theta, half)[:, None, None]
@@ -201,7 +203,7 @@ def _scored(strips: _Strips, shifts: list[tuple[int, int]], cost: F32) -> Compar
 def _at_frame(excess: F32, known: Mask) -> F32:
     """(C,) the most that a band along the frame is too bright, less what is so far from it as well."""
     rows, columns = excess.shape
-    last = rows - _pixels(_EDGE)
+    last = rows - _pixels(EDGE)
     total = np.concatenate([np.zeros((1, columns)), np.cumsum(excess, axis=0, dtype=np.float64)])
     count = np.concatenate([np.zeros((1, columns), np.intp), np.cumsum(known, axis=0)])
     most = np.full(columns, -np.inf)

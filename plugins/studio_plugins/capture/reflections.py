@@ -21,6 +21,7 @@ from studio_plugins.capture.ring import runs
 _SURE, _PART = 0.38, 0.2  # stops: that a reflection has somewhere, and everywhere
 _ALONG = 8.0  # degrees of azimuth that a reflection fills at least, but for a fifth of them
 _STEEP = 0.25  # stops: so much more than a column has itself is not its own
+_GAP = 6.0  # degrees: a lamp or an edge in a reflection does not part it
 _NARROWEST = 6.0  # degrees
 _WHOLE = 0.92  # of the turn: a frame that throws light back everywhere cannot be told from a scale
 _MARGIN = 2.0  # degrees that a rectangle reaches further, all round
@@ -34,9 +35,9 @@ def find_reflections(
     """Rectangles for either lens, brightest first.
 
     Views hold light as photographed, falloff not undone (`registration` tells it). Nothing is found without
-    a second lens, or where both see less than a degree in common.
+    a second lens and a registration to trust, or where both see less than a degree in common.
     """
-    if back is None or registration is None or not settings.automatic:
+    if back is None or registration is None or not registration.trusted or not settings.automatic:
         return ()
     views = {FRONT: front, BACK: back}
     found: list[Patch] = []
@@ -52,9 +53,13 @@ def patches_of(comparison: Comparison, side: str, edge: float, sensitivity: floa
     level = _opened(comparison.score)
     some = np.maximum(level, _opened(comparison.likely))
     found: list[Patch] = []
-    if (some > _PART / sensitivity).mean() > _WHOLE:  # this is a scale that is wrong
+    bright = some > _PART / sensitivity
+    if bright.mean() > _WHOLE:  # this is a scale that is wrong
         return found
-    for start, length in runs(some > _PART / sensitivity):
+    for start, length in runs(~bright):
+        if length * STEP <= _GAP:
+            bright[(start + np.arange(length)) % len(bright)] = True
+    for start, length in runs(bright):
         columns = (start + np.arange(length)) % len(level)
         if length * STEP >= _NARROWEST and level[columns].max() > _SURE / sensitivity:
             inner, excess = _depth(comparison, columns, edge)

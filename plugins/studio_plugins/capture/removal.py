@@ -20,7 +20,7 @@ from studio_core.capturing.settings import BACK, FRONT, OTHER_LENS, RING, Patch
 from studio_core.imaging.poisson import membrane
 from studio_core.imaging.projection import unproject
 from studio_core.shading.job import Job
-from studio_plugins.capture.compare import Comparison, compare, falloff_at, towards
+from studio_plugins.capture.compare import EDGE, Comparison, compare, falloff_at, towards
 from studio_plugins.capture.ring import angles, coarser, directions
 
 _FLOOR = 1e-4  # of the median light
@@ -61,7 +61,12 @@ def remove(
             continue
         taken: _Source | None = None
         other = views.get(_opposite(patch.side))
-        if patch.source == OTHER_LENS and other is not None and registration is not None:
+        if (
+            patch.source == OTHER_LENS
+            and other is not None
+            and registration is not None
+            and registration.trusted
+        ):
             if patch.side not in shifts:
                 shifts[patch.side] = compare(own, other, registration, patch.side, job)
             avoided = [
@@ -197,7 +202,8 @@ def _filled(own: View, area: _Area, source: _Source) -> F32:
     grid = directions(area.azimuth[None, :], area.theta[:, None])
     light, seen = look(own, grid)
     ratio = _log(light, _floor(own)) - source.grid
-    told = seen & source.known
+    shadow = area.theta > own.lens.half - math.radians(EDGE)
+    told = seen & source.known & ~shadow[:, None]
     sides: list[Any] = [np.s_[0, :]]
     if area.held:
         sides.append(np.s_[-1, :])
