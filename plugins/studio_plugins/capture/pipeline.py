@@ -196,7 +196,8 @@ class _Pass:
                 return stitch_equirectangular(clean_views[FRONT], wanted.stitch, job, workers)
             return stitch(clean_views, registration, wanted.stitch, job, workers, level)
 
-        stitched = self._stage("stitch", (views, registration, reflections, wanted.stitch), join)
+        joined = dataclasses.replace(wanted.stitch, face=0)  # the cube map is cut from the finished picture
+        stitched = self._stage("stitch", (views, registration, reflections, level, joined), join)
         self._tell(stitched=stitched, notes=stitched.notes)
         self._reached("stitch")
 

@@ -99,6 +99,8 @@ def test_two_brackets_become_the_room(after: FisheyeRun) -> None:
     [
         ({"calibration": CalibrationSettings(white="temperature", kelvin=3000.0)}, "calibration"),
         ({"stitch": StitchSettings(width=200, level=False)}, "stitch"),
+        ({"stitch": StitchSettings(width=256, level=False, north=30.0)}, "stitch"),
+        ({"stitch": StitchSettings(width=256, level=False, face=32)}, "calibration"),
         (
             {"reflections": ReflectionSettings(patches=(Patch("front", 20.0, 15.0, 85.0, 94.0),))},
             "reflections",
