@@ -49,6 +49,8 @@ def capture(options: argparse.Namespace, program: Headless) -> None:
         state: CaptureState = run.run(photographs, settings, job)
     if state.captured is None:
         raise InputError("the photographs gave no environment")
+    if not state.captured.environment.pixels.any():
+        raise InputError("the photographs are black: there is no light in them")
     notes = list(dict.fromkeys([*notes, *state.notes, *state.captured.notes]))
     for note in notes:
         program.say(note)
@@ -274,6 +276,10 @@ def _save(path: Path, state: CaptureState, settings: CaptureSettings, kept: Sequ
         save(path, document.scene, label="Capture", history=history, session=session)
 
 
+def _percent(share: float) -> str:
+    return f"{100 * share:.0f}" if share > 0.1 else f"{100 * share:.2g}"
+
+
 def _tell(
     options: argparse.Namespace,
     program: Headless,
@@ -299,4 +305,4 @@ def _tell(
         "report": plain(captured.report),
     }
     text = f"{places[0]}: {width} × {height} from {photographs} photograph{'s' if photographs > 1 else ''}"
-    result(options, program, values, f"{text}, {100 * lost:.2g} % unresolved" if lost else text)
+    result(options, program, values, f"{text}, {_percent(lost)} % unresolved" if lost else text)
