@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
 CAPTURER = "fisheye"
 PICTURES = (".exr", ".hdr")
+TOO_DARK = 2  # of `Captured.unresolved`, or never seen
 
 
 @dataclass(frozen=True)
@@ -49,7 +50,7 @@ def capture(options: argparse.Namespace, program: Headless) -> None:
         state: CaptureState = run.run(photographs, settings, job)
     if state.captured is None:
         raise InputError("the photographs gave no environment")
-    if not state.captured.environment.pixels.any():
+    if (state.captured.unresolved >= TOO_DARK).all():
         raise InputError("the photographs are black: there is no light in them")
     notes = list(dict.fromkeys([*notes, *state.notes, *state.captured.notes]))
     for note in notes:

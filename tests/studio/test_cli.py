@@ -20,11 +20,13 @@ from scenes import little_scene
 import studio.display
 import studio.verbs
 import studio.verbs_pictures
+from studio.bench.phone_files import write_photograph
 from studio.cli import BAD_INPUT, INTERRUPTED, NOBODY_READS, OUR_FAULT, VERBS, main, parser
 from studio_core.errors import LucarneError
 from studio_core.imaging.encode import write_exr
 from studio_core.imaging.io import ImageDecoder
 from studio_core.imaging.latlong import direction_to_uv
+from studio_core.imaging.photograph import Photograph, ShotFacts
 from studio_core.project.lock import acquire
 from studio_core.project.recovery import RecoveryFile, recovery_path
 from studio_core.project.store import load, save
@@ -401,7 +403,7 @@ def test_names_that_the_terminal_cannot_show_are_shown_escaped(tmp_path: Path) -
 
 def test_no_verb_without_a_window_loads_qt(files: Path) -> None:
     shades = np.tile(np.arange(0, 256, 2, dtype=np.uint8)[None, :, None], (64, 1, 3))
-    PIL.Image.fromarray(shades).save(files / "all.jpg")
+    write_photograph(Photograph(shades, ShotFacts("all.jpg"), "0"), files / "all.jpg")
     (files / "script.py").write_text("import studio_core")
     commands = [
         ["new", "made.lucarne", "--mesh", "box.obj", "--env", "sky.exr", "--floor", "3"],
