@@ -40,6 +40,7 @@ from studio_core.capturing.settings import (
 from studio_core.imaging.latlong import equirect_direction, pixel_solid_angles
 
 if TYPE_CHECKING:
+    from studio_core.contract import CaptureRun
     from studio_core.shading.job import Job
 
 F32 = npt.NDArray[np.float32]
@@ -63,8 +64,8 @@ COVERED = 0.005
 class Setup:
     """How much is measured: phones a map, pixels of the circle's radius, columns of the environment."""
 
-    phones: int = 3
-    radius: float = 420.0
+    phones: int = 2
+    radius: float = 300.0
     width: int = 1024
     captures: int = 200
     heaps: int = 20
@@ -219,6 +220,7 @@ def _over_phones(
         )
         drawn = replace(drawn, evs=ladder_of(room, drawn))
         shots: Shots | None = None
+        capture: CaptureRun | None = None
         within = dimmed(room, drawn)
         for kind in wanted:
             case, wrong = CASES[kind], None
@@ -228,11 +230,12 @@ def _over_phones(
             if case.wrong:
                 phone, *wrong = wrong_table(phone, seed)
             light = room if case.meter else within
-            if shots is None or case.meter or shots.truth.phone != phone:
+            if shots is None or capture is None or case.meter or shots.truth.phone != phone:
                 shots = shoot(light, phone, seed)
+                capture = program.registry.get("capturer", CAPTURER).open(program.services)
             case_name = f"{name}/{kind}"
             with program.job(f"{case_name} {seed + 1}/{setup.phones}") as job:
-                before, state = _captured(program, case, shots, light, setup.width, job)
+                before, state = _captured(capture, case, shots, light, setup.width, job)
             values = measured(state, shots, light, wrong)
             if case.meter:
                 without = measured(before, shots, light)
@@ -251,10 +254,9 @@ def _over_phones(
 
 
 def _captured(
-    program: Headless, case: Case, shots: Shots, room: F32, width: int, job: Job
+    capture: CaptureRun, case: Case, shots: Shots, room: F32, width: int, job: Job
 ) -> tuple[CaptureState, CaptureState]:
     """Without a light meter, and as the case has it."""
-    capture = program.registry.get("capturer", CAPTURER).open(program.services)
     photographs = (*shots.front, *shots.back)
     settings = with_sides(settings_for(case, shots.truth.phone, width), shots)
     state: CaptureState = capture.run(photographs, settings, job)
