@@ -143,10 +143,11 @@ class View:
 class Registration:
     """`rotation` (3, 3): front lens' frame from the back lens' frame. `gain`: front = gain · back (3,).
 
-    `falloff` (3,): light at s = θ / θ_max is 1 + a s² + b s⁴ + c s⁶ of the axis'. `spread`: median angle
-    between what both show after registration, degrees; `matches` were used; `doubt`: standard deviation of
-    the rotation about its least certain axis, degrees. `front`, `back`: the circles, their centres moved so
-    that both lenses fit together; None: as they were.
+    `falloff` (3,): light at s = θ / θ_max is 1 + a s² + b s⁴ + c s⁶ of the axis'. `rim`: share of light that
+    the lens' frame cuts off beside that, at which s half of it, and how gradually (`light_at` has both).
+    `spread`: median angle between what both show after registration, degrees; `matches` were used; `doubt`:
+    standard deviation of the rotation about its least certain axis, degrees. `front`, `back`: the circles,
+    their centres moved so that both lenses fit together; None: as they were.
     """
 
     rotation: F64
@@ -160,6 +161,26 @@ class Registration:
     front: Circle | None = None
     back: Circle | None = None
     doubt: float = 0.0
+    rim: tuple[float, float, float] = (0.0, 1.0, 0.02)
+
+    def light_at(self, s: npt.ArrayLike) -> F64:
+        """Light at s = θ / θ_max, relative to the axis'; as at 1.1 further out, never below 0.02."""
+        return light_at(self.falloff, self.rim, s)
+
+    @property
+    def loss(self) -> float:
+        """Share of the axis' light that is lost at the edge."""
+        return 1.0 - float(self.light_at(1.0))
+
+
+def light_at(falloff: tuple[float, float, float], rim: tuple[float, float, float], s: npt.ArrayLike) -> F64:
+    """What `Registration.light_at` says."""
+    s = np.minimum(np.asarray(s, np.float64), 1.1)
+    square, (a, b, c), (share, at, width) = s * s, falloff, rim
+    light = 1 + square * (a + square * (b + square * c))
+    if share > 0:
+        light = light * (1 - share / (1 + np.exp(np.clip((at - s) / width, -60, 60))))
+    return np.asarray(np.maximum(light, 0.02), np.float64)
 
 
 @dataclass(frozen=True, eq=False)

@@ -65,9 +65,7 @@ def towards(registration: Registration, side: str) -> tuple[F64, F64]:
 
 def falloff_at(registration: Registration, theta: F64, half: float) -> F64:
     """Light at angles from the axis, relative to the axis'; never below 0.02."""
-    a, b, c = registration.falloff
-    s = (theta / half) ** 2
-    return np.maximum(1 + s * (a + s * (b + s * c)), 0.02)
+    return registration.light_at(theta / half)
 
 
 def compare(own: View, other: View, registration: Registration, side: str, job: Job) -> Comparison | None:

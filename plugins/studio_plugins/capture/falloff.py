@@ -3,7 +3,8 @@
 A direction that lies at s = θ / θ_max in one lens lies at about 2 · 90° / θ_max − s in the other: the ratio
 of both tells how steeply light falls near the edge, and hardly more. How it falls further inside is assumed
 to lie between the square (cos⁴-like) and the sixth power of s, the loss being (1 − u − v) s² + u s⁴ + v s⁶
-of its whole with u near 0.35 and v near 0.1; the overlap decides where it says more than that.
+of its whole with u near 0.32 and v near 0.1; the overlap decides where it says more than that. A frame that
+cuts light off only near the edge shows as a step there (a logistic curve), which no such power explains.
 """
 
 from __future__ import annotations
@@ -13,40 +14,37 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from studio_core.capturing.artifacts import F64
+from studio_core.capturing.artifacts import F64, light_at
 from studio_plugins.capture.overlap import Stand, Strip, across, padded, ways
 
 _BINS, _SECTORS = 24, 12
 _EDGE = 0.985  # of θ_max: further out the circle's soft border begins
-_SHAPE = (0.35, 0.1)
-_SHAPE_SPREAD = (0.15, 0.1)
+_SHAPE = (0.32, 0.1)
+_SHAPE_SPREAD = (0.2, 0.1)
 _ROUGH = 0.006  # what a bin's median may be wrong by beyond its noise, in ln
 _LOSS_SPREAD = 0.35
 _MOST = 0.85
 _FEW = 20
+NO_RIM = (0.0, 1.0, 0.02)
+_STEEPER, _GAIN = 0.6, 30.0  # how much better a steep rim must explain what is seen
+_SHAPE_DOUBT = 0.15  # of what is lost, for what the overlap does not tell
 
 
 @dataclass(frozen=True, eq=False)
 class Balance:
-    """`gain` (3,): front = gain · back. `falloff`: light at s is 1 + a s² + b s⁴ + c s⁶. `doubt`: standard
+    """`gain` (3,): front = gain · back. `falloff` and `rim`: as in `Registration`. `doubt`: standard
     deviation of the light lost at the edge. `off`: what ratios still differ by, median, log2."""
 
     gain: F64
     falloff: tuple[float, float, float]
     doubt: float
     off: float
+    rim: tuple[float, float, float] = NO_RIM
 
     @property
     def loss(self) -> float:
         """Share of the light that is lost at the edge."""
-        return -sum(self.falloff)
-
-
-def light_at(falloff: tuple[float, float, float], s: F64) -> F64:
-    """Share of the axis' light at s = θ / θ_max."""
-    square = np.asarray(s, np.float64) ** 2
-    a, b, c = falloff
-    return np.asarray(1 + square * (a + square * (b + square * c)), np.float64)
+        return 1 - float(light_at(self.falloff, self.rim, 1.0))
 
 
 def from_loss(loss: float) -> tuple[float, float, float]:
@@ -65,18 +63,13 @@ def balanced(front: Strip, back: Strip, stand: Stand, loss: float | None = None)
     ratio, here, there, noise = _ratios(front, back, stand)
     if len(ratio) < _FEW:
         return None
+    first = np.median(ratio, axis=0)
 
-    def shape(x: F64) -> tuple[float, float, float]:
-        if loss is not None:
-            return from_loss(loss)
-        whole, u, v = x[3:]
-        return -whole * (1 - u - v), -whole * u, -whole * v
+    def light(x: F64, s: F64) -> F64:
+        return light_at(from_loss(loss) if loss is not None else _falloff(x), _rim(x), s)
 
     def left(x: F64) -> F64:
-        falloff = shape(x)
-        fall = np.log(np.maximum(light_at(falloff, here), 0.02)) - np.log(
-            np.maximum(light_at(falloff, there), 0.02)
-        )
+        fall = np.log(light(x, here)) - np.log(light(x, there))
         return np.asarray((ratio - fall[:, None] - x[:3]) / noise, np.float64)
 
     def terms(x: F64) -> F64:
@@ -85,23 +78,37 @@ def balanced(front: Strip, back: Strip, stand: Stand, loss: float | None = None)
         soft = np.sign(some) * np.sqrt(2 * (np.sqrt(1 + (some / 1.5) ** 2) - 1)) * 1.5
         if loss is not None:
             return np.asarray(soft, np.float64)
-        prior = [x[3] / _LOSS_SPREAD, *((x[4:] - _SHAPE) / _SHAPE_SPREAD)]
-        return np.concatenate([soft, prior])
+        return np.concatenate([soft, [x[3] / _LOSS_SPREAD, *((x[4:6] - _SHAPE) / _SHAPE_SPREAD)]])
 
-    first = np.median(ratio, axis=0)
     if loss is not None:
         found = least_squares(terms, first)
-    else:
-        start = np.concatenate([first, [0.1, *_SHAPE]])
-        low = [*(first - 3), 0.0, 0.0, 0.0]
-        high = [*(first + 3), _MOST, 0.8, 0.6]
-        found = least_squares(terms, start, bounds=(low, high), x_scale=[0.1, 0.1, 0.1, 0.1, 0.1, 0.1])
-    doubt = 0.0
-    if loss is None:
-        spread = np.linalg.pinv(found.jac.T @ found.jac)
-        doubt = math.sqrt(max(float(spread[3, 3]), 0.0))
-    off = float(np.median(np.abs(left(found.x) * noise))) / math.log(2)
-    return Balance(np.exp(found.x[:3]), shape(found.x), doubt, off)
+        return Balance(np.exp(found.x), from_loss(loss), 0.0, _off(left(found.x), noise))
+    start = np.array([*first, 0.1, *_SHAPE, 0.1, 0.93, 0.02])
+    low = np.array([*(first - 3), 0.0, -0.25, 0.0, 0.0, 0.85, 0.008])
+    high = np.array([*(first + 3), _MOST, 0.8, 0.6, 0.9, 1.0, 0.06])
+    smooth = least_squares(terms, start[:6], bounds=(low[:6], high[:6]), x_scale=0.1)
+    steep = least_squares(terms, start, bounds=(low, high), x_scale=[0.1] * 6 + [0.1, 0.03, 0.02])
+    found = smooth
+    if steep.cost < _STEEPER * smooth.cost and smooth.cost - steep.cost > _GAIN:
+        found = steep
+    spread = np.linalg.pinv(found.jac.T @ found.jac)
+    falloff, rim = _falloff(found.x), _rim(found.x)
+    lost = 1 - float(light_at(falloff, rim, 1.0))
+    doubt = math.hypot(math.sqrt(max(float(spread[3, 3]), 0.0)), _SHAPE_DOUBT * lost)
+    return Balance(np.exp(found.x[:3]), falloff, doubt, _off(left(found.x), noise), rim)
+
+
+def _falloff(x: F64) -> tuple[float, float, float]:
+    whole, u, v = (float(p) for p in x[3:6])
+    return -whole * (1 - u - v), -whole * u, -whole * v
+
+
+def _rim(x: F64) -> tuple[float, float, float]:
+    return NO_RIM if len(x) < 9 else (float(x[6]), float(x[7]), float(x[8]))
+
+
+def _off(left: F64, noise: F64) -> float:
+    return float(np.median(np.abs(left * noise))) / math.log(2)
 
 
 def _ratios(front: Strip, back: Strip, stand: Stand) -> tuple[F64, F64, F64, F64]:
@@ -112,14 +119,14 @@ def _ratios(front: Strip, back: Strip, stand: Stand) -> tuple[F64, F64, F64, F64
     there = across(front, back, at, stand)
     x, y = back.pixels(there)
     usable = cv2.remap(
-        padded(back.usable.astype(np.float32)), x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT
+        padded(back.resolved.astype(np.float32)), x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT
     )
     other = np.asarray(cv2.remap(padded(back.light), x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE))
     half = math.radians(stand.fov) / 2
     s_front = np.arccos(np.clip(-ways(front, at, stand)[..., 2], -1, 1)) / half
     turned = ways(back, there, stand)
     s_back = np.arccos(np.clip(turned[..., 2], -1, 1)) / half
-    both = front.usable & (np.asarray(usable) > 0.99) & (s_front < _EDGE) & (s_back < _EDGE)
+    both = front.resolved & (np.asarray(usable) > 0.99) & (s_front < _EDGE) & (s_back < _EDGE)
     empty = np.zeros((0, 3)), np.zeros(0), np.zeros(0), np.zeros((0, 1))
     if both.sum() < 100:
         return empty

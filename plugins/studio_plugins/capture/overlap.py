@@ -24,7 +24,8 @@ _FLOOR = 1e-4
 
 @dataclass(frozen=True, eq=False)
 class Strip:
-    """A lens' rim (rows of t, columns of a): log2 luminance, log2 of the channels, where it is usable.
+    """A lens' rim (rows of t, columns of a): log2 luminance, log2 of the channels, where it is usable
+    and where exposures resolved it too.
 
     `first`: radians at the upper edge of the first row; `step`: radians a pixel both ways. `turned`: the back
     lens'. `lens` and `circle` are those it was unrolled with.
@@ -33,6 +34,7 @@ class Strip:
     tone: F32
     light: F32
     usable: Mask
+    resolved: Mask
     first: float
     step: float
     turned: bool
@@ -52,11 +54,7 @@ class Strip:
 
     def grid(self) -> F64:
         """(rows, columns, 2): a and t of all pixels."""
-        rows, columns = self.shape
-        a, t = np.meshgrid(
-            (np.arange(columns) + 0.5) * self.step, self.first + (np.arange(rows) + 0.5) * self.step
-        )
-        return np.stack([a, t], axis=-1)
+        return _places(*self.shape, self.first, self.step)
 
 
 PAD = 8
@@ -98,17 +96,6 @@ class Patches:
 NOTHING = Patches(np.zeros((0, 2)), np.zeros((0, 2)), np.zeros((0, 2, 2)), np.zeros(0), np.zeros(0), 0.0)
 
 
-def shrunk(light: F32, usable: Mask, size: tuple[int, int]) -> tuple[F32, F32]:
-    """Usable light averaged to a picture of `size` (width, height), and what share of each was usable."""
-    import cv2
-
-    shown = np.where(usable[..., None], light, np.float32(0))
-    share = np.asarray(cv2.resize(usable.astype(np.float32), size, interpolation=cv2.INTER_AREA), np.float32)
-    mean = np.asarray(cv2.resize(shown, size, interpolation=cv2.INTER_AREA), np.float32)
-    mean /= np.maximum(share, np.float32(1e-6))[..., None]
-    return mean, share
-
-
 def unroll(view: View, turned: bool, inner: float, per_degree: float) -> Strip:
     """A lens' rim from the angle `inner` (radians from its axis) to its edge, `per_degree` pixels a degree.
 
@@ -116,42 +103,61 @@ def unroll(view: View, turned: bool, inner: float, per_degree: float) -> Strip:
     """
     import cv2
 
-    step = math.radians(1) / per_degree
-    columns = round(2 * math.pi / step)
+    columns = round(360 * per_degree)
     step = 2 * math.pi / columns
     rows = max(8, math.ceil((view.lens.half - inner) / step))
     first = math.pi - view.lens.half if turned else view.lens.half - rows * step
-    circle: Circle = view.circle
-    light: F32 = view.light
-    share: F32 = view.usable.astype(np.float32)
-    finer = circle.radius / view.lens.half * step
-    if finer > _FINER:
-        x0, y0 = max(0, int(circle.x - circle.radius) - 2), max(0, int(circle.y - circle.radius) - 2)
-        cut = np.s_[y0 : int(circle.y + circle.radius) + 3, x0 : int(circle.x + circle.radius) + 3]
-        height, width = light[cut].shape[:2]
-        small = max(1, round(width / finer)), max(1, round(height / finer))
-        light, share = shrunk(light[cut], view.usable[cut], small)
-        scale = np.array([small[0] / width, small[1] / height])
-        offset = np.array([x0, y0])
-    else:
-        scale, offset = np.ones(2), np.zeros(2)
-    empty = np.empty((0, 0), np.float32)
-    strip = Strip(
-        np.empty((rows, columns), np.float32), empty, empty > 0, first, step, turned, view.lens, circle
-    )
-    points, _ = project(view.lens, circle, _polar(strip.grid()) @ (HALF_TURN if turned else np.eye(3)))
+    light, usable, resolved, scale, offset = _shrunk(view, view.circle.radius / view.lens.half * step)
+    places = _places(rows, columns, first, step)
+    points, _ = project(view.lens, view.circle, _polar(places) @ (HALF_TURN if turned else np.eye(3)))
     x, y = np.moveaxis(((points - offset) * scale - 0.5).astype(np.float32), -1, 0)
     x, y = np.ascontiguousarray(x), np.ascontiguousarray(y)
-    seen = cv2.remap(share, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT)
-    made = np.asarray(cv2.remap(light, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE), np.float32)
-    usable = np.asarray(seen > 0.99)
+
+    def shown(picture: F32) -> F32:
+        return np.asarray(cv2.remap(picture, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT))
+
+    made, there, sure = shown(light), shown(usable) > 0.99, shown(resolved) > 0.99
     luminance = made @ np.array(LUMINANCE, np.float32)
-    some = luminance[usable]
-    floor = _FLOOR * float(np.median(some)) if some.size else 1.0
-    tone = np.log2(np.maximum(luminance, max(floor, 1e-20))).astype(np.float32)
-    channels = np.log2(np.maximum(made, max(floor, 1e-20))).astype(np.float32)
-    usable &= luminance > floor
-    return Strip(tone, channels, usable, first, step, turned, view.lens, circle)
+    some = luminance[there]
+    floor = max(_FLOOR * float(np.median(some)), 1e-20) if some.size else 1.0
+    there &= luminance > floor
+    tone = np.log2(np.maximum(luminance, floor)).astype(np.float32)
+    channels = np.log2(np.maximum(made, floor)).astype(np.float32)
+    return Strip(tone, channels, there, there & sure, first, step, turned, view.lens, view.circle)
+
+
+def _shrunk(view: View, finer: float) -> tuple[F32, F32, F32, F64, F64]:
+    """Light, share that is usable and share that is resolved too, averaged over `finer` pixels both ways.
+
+    With the factors (2,) and the offset (2,) that lead from the view's points to theirs.
+    """
+    import cv2
+
+    usable, resolved = view.usable, view.usable
+    for lost in (view.clipped, view.dark):
+        resolved = resolved if lost is None else resolved & ~lost
+    if finer <= _FINER:
+        return view.light, usable.astype(np.float32), resolved.astype(np.float32), np.ones(2), np.zeros(2)
+    circle = view.circle
+    x0, y0 = max(0, int(circle.x - circle.radius) - 2), max(0, int(circle.y - circle.radius) - 2)
+    cut = np.s_[y0 : int(circle.y + circle.radius) + 3, x0 : int(circle.x + circle.radius) + 3]
+    height, width = usable[cut].shape
+    size = max(1, round(width / finer)), max(1, round(height / finer))
+
+    def mean(picture: F32) -> F32:
+        return np.asarray(cv2.resize(picture, size, interpolation=cv2.INTER_AREA), np.float32)
+
+    shares = [mean(mask[cut].astype(np.float32)) for mask in (usable, resolved)]
+    light = mean(view.light[cut] * usable[cut][..., None].astype(np.float32))
+    light /= np.maximum(shares[0], np.float32(1e-6))[..., None]
+    scale = np.array([size[0] / width, size[1] / height])
+    return light, shares[0], shares[1], scale, np.array([x0, y0], np.float64)
+
+
+def _places(rows: int, columns: int, first: float, step: float) -> F64:
+    """(rows, columns, 2): a and t of a strip's pixels."""
+    a, t = np.meshgrid((np.arange(columns) + 0.5) * step, first + (np.arange(rows) + 0.5) * step)
+    return np.stack([a, t], axis=-1)
 
 
 def _polar(places: F64) -> F64:

@@ -11,7 +11,7 @@ from studio_core.capturing.settings import LensSettings, RegistrationSettings
 from studio_core.capturing.standing import rotation_from
 from studio_core.imaging.projection import OCAM, ORTHOGRAPHIC, Circle, Lens
 from studio_core.shading.job import Job
-from studio_plugins.capture.falloff import Balance, balanced, from_loss
+from studio_plugins.capture.falloff import NO_RIM, Balance, balanced, from_loss
 from studio_plugins.capture.guesses import by_features, by_rolling, by_sliding
 from studio_plugins.capture.overlap import Stand, Strip, rotation_of, stand_of, unroll
 from studio_plugins.capture.refine import BLURS, refined
@@ -141,7 +141,7 @@ def _registration(
     off = stand.fov / front.lens.fov - 1
     if abs(off) > 0.03:
         notes.append(f"The field of view is {stand.fov:.1f}°, not {front.lens.fov:.0f}°.")
-    gain, falloff = _balance(found, settings, lens, notes)
+    gain, falloff, rim = _balance(found, settings, lens, notes)
     return Registration(
         rotation=rotation_of(stand),
         lens=front.lens if stand.fov == front.lens.fov else front.lens.with_fov(stand.fov),
@@ -154,6 +154,7 @@ def _registration(
         front=_moved(front.circle, stand.front),
         back=_moved(back.circle, stand.back),
         doubt=fit.doubt,
+        rim=rim,
     )
 
 
@@ -165,14 +166,14 @@ def _moved(circle: Circle, shift: F64) -> Circle:
 
 def _balance(
     found: Balance | None, settings: RegistrationSettings, lens: LensSettings, notes: list[str]
-) -> tuple[F64, tuple[float, float, float]]:
+) -> tuple[F64, tuple[float, float, float], tuple[float, float, float]]:
     if found is None or found.off > _UNLIKE:
         if found is not None:
             notes.append("Both lenses differ too much in brightness where they overlap to balance them.")
-        return np.full(3, 2.0**-settings.exposure), from_loss(lens.falloff or 0.0)
+        return np.full(3, 2.0**-settings.exposure), from_loss(lens.falloff or 0.0), NO_RIM
     if found.loss > 0 and found.doubt > max(0.1, 0.7 * found.loss):
         notes.append(f"The light lost at the lens' edge is uncertain: {found.loss:.0%} ± {found.doubt:.0%}.")
-    return found.gain, found.falloff
+    return found.gain, found.falloff, found.rim
 
 
 def _as_set(
@@ -185,9 +186,9 @@ def _as_set(
 ) -> Registration:
     """What the settings say, with what could be found beside."""
     notes = [why] if why else []
-    gain, falloff = _balance(found, settings, lens, notes)
+    gain, falloff, rim = _balance(found, settings, lens, notes)
     trusted = not settings.automatic
-    return Registration(rotation_of(stand), front.lens, gain, falloff, 0.0, 0, trusted, tuple(notes))
+    return Registration(rotation_of(stand), front.lens, gain, falloff, 0.0, 0, trusted, tuple(notes), rim=rim)
 
 
 def alone(view: View, lens: LensSettings) -> Registration:

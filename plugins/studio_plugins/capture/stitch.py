@@ -194,21 +194,18 @@ def _lenses(views: Mapping[str, View], registration: Registration | None, pitch:
             lens = registration.lens
             moved = registration.front if side == FRONT else registration.back
             view = replace(view, lens=lens, circle=moved or view.circle)
-            if any(registration.falloff):
-                falloff = _falloff(registration.falloff, lens.half)
+            if registration.loss:
+                falloff = _falloff(registration, lens.half)
             if side == BACK and FRONT in views:
                 frame, gain = registration.rotation.T, registration.gain
         made.append(_Lens(lens_source(view, pitch), frame, falloff, gain))
     return made
 
 
-def _falloff(coefficients: tuple[float, float, float], half: float) -> Callable[[F64], F32]:
-    a, b, c = coefficients
-
+def _falloff(registration: Registration, half: float) -> Callable[[F64], F32]:
     def of(cosine: F64) -> F32:
-        s = np.arccos(np.clip(cosine, -1, 1)) / half
-        q = np.minimum(s * s, 1.21)
-        return np.maximum(1 + q * (a + q * (b + q * c)), 0.05).astype(np.float32)
+        light = registration.light_at(np.arccos(np.clip(cosine, -1, 1)) / half)
+        return np.maximum(light, 0.05).astype(np.float32)
 
     return of
 

@@ -21,7 +21,7 @@ from studio_core.errors import Cancelled
 from studio_core.imaging.environment import load_environment
 from studio_core.imaging.projection import KANNALA_BRANDT, ORTHOGRAPHIC, Circle, Lens
 from studio_core.shading.job import Job
-from studio_plugins.capture.falloff import from_loss, light_at
+from studio_plugins.capture.falloff import from_loss
 from studio_plugins.capture.register import alone, register
 
 DATA = Path(os.environ.get("LUCARNE_TEST_DATA", "../shared/data"))
@@ -84,7 +84,7 @@ def test_a_phone_that_is_a_little_off(plain: Truth) -> None:
     assert found.spread < 0.1
     assert found.gain == pytest.approx(1, abs=0.02)
     s = np.linspace(0, 1, 9)
-    assert light_at(found.falloff, s) == pytest.approx(PHONE.falloff_at(s), abs=0.05)
+    assert found.light_at(s) == pytest.approx(PHONE.falloff_at(s), abs=0.05)
     assert found.rotation @ found.rotation.T == pytest.approx(np.eye(3), abs=1e-9)
 
 
@@ -203,7 +203,7 @@ def test_by_hand_it_is_as_it_was_set(plain: Truth) -> None:
 
 def test_a_falloff_that_is_known_counts(plain: Truth) -> None:
     found = registered(plain, falloff=0.4)
-    assert light_at(found.falloff, np.array(1.0)) == pytest.approx(0.6)
+    assert found.light_at(1.0) == pytest.approx(0.6)
     single = alone(views(plain)[0], LensSettings(falloff=0.3))
     assert single.falloff == from_loss(0.3)
     assert alone(views(plain)[0], LensSettings()).falloff == pytest.approx((0, 0, 0))

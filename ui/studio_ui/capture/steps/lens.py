@@ -114,7 +114,7 @@ class LensStep(StepForm):
         self.coefficients.show_value(", ".join(f"{k:g}" for k in settings.lens.coefficients))
         loss = settings.lens.falloff
         if loss is None:
-            loss = -sum(registration.falloff) if registration is not None else 0.0
+            loss = registration.loss if registration is not None else 0.0
         self.falloff.show_values({"falloff": 100 * min(max(loss, 0.0), 1.0)})
         self.found_falloff.setEnabled(settings.lens.falloff is not None)
         for name in ("yaw", "pitch", "roll", "exposure"):
