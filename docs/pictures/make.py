@@ -1,8 +1,9 @@
-"""Makes the pictures of these pages: `python docs/pictures/make.py room | windows | chair`, from a checkout.
+"""Makes the pictures of these pages: `python docs/pictures/make.py room | windows | chair | capture`.
 
 `room` renders the sample room, `windows` photographs the window when it has come to rest (both themes, 100
 and 150 %; `window THEME PERCENT` makes one of them), `chair` drags a chair through the settled room as a hand
-does and lets it rest, exact and refined.
+does and lets it rest, exact and refined. `capture` has the simulated phone photograph the sample room and the
+capture panel make its light of that.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
@@ -28,6 +29,9 @@ STEPS, REST = 32, 24  # pictures of the drag; how long the last one stays, in pi
 PER_PICTURE = 70  # milliseconds
 WAY = ((0.0, 0.0), (1.55, 0.55))  # of the chair over the floor, metres in x and z
 SETTLED = 180  # seconds that a window may take to come to rest
+PHONE_AT = (0.7, 1.3, 0.6)  # where the phone is held in the sample room, metres
+FACE, PANEL = 512, (1280, 800)  # pixels of a side of the room's cube, and of the capture panel
+STEPS_SHOWN = ("reflections", "join")
 
 
 def room() -> None:
@@ -145,5 +149,95 @@ def chair() -> None:
     )
 
 
+def around() -> np.ndarray:
+    """(2 FACE, 4 FACE, 3) the light at one place of the sample room, its furniture in the middle."""
+    from studio.headless import Headless
+    from studio.samples import sample
+    from studio.verbs import open_scene
+    from studio_core.imaging.cubemap import equirect_from_cube
+    from studio_core.raster import PictureStage
+    from studio_core.scene.diff import everything
+    from studio_core.scene.transform import looking
+    from studio_core.session import View
+    from studio_core.shading.frame import Frame
+    from studio_core.shading.job import Job
+    from studio_core.shading.pipeline import Pipeline
+
+    program = Headless(quiet=True)
+    scene = open_scene(sample())
+    backend = program.registry.get("backend", "cuts")
+    pipeline = Pipeline([*backend.stages(program.services), PictureStage(program.services)])
+    up, back, ahead = (0, 1, 0), (0, 0, 1), (0, 0, -1)
+    sides = [((1, 0, 0), up), ((-1, 0, 0), up), (up, back), ((0, -1, 0), ahead), (back, up), (ahead, up)]
+    faces = []
+    for towards, above in sides:
+        place = looking(PHONE_AT, np.add(PHONE_AT, towards), above)
+        frame = Frame(scene, View(place, 90.0, FACE, FACE), backend.Params())
+        faces.append(pipeline.update(frame, everything(scene), Job("room")).linear)
+    light = equirect_from_cube(np.stack(faces).astype(np.float32))
+    return np.roll(light, round(-0.4 * light.shape[1]), axis=1)
+
+
+def capture() -> None:
+    """Photographs of the sample room, and the panel on two of its steps."""
+    os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
+    os.environ["LUCARNE_STATE"] = tempfile.mkdtemp(prefix="lucarne-pictures-")
+    from PIL import Image
+    from PySide6.QtGui import QImage
+    from PySide6.QtWidgets import QApplication
+
+    from studio.app import assemble
+    from studio.bench.phone import Arc, Phone, shoot
+    from studio.bench.phone_files import write_shots
+    from studio_core.imaging.projection import Circle, Lens
+    from studio_ui.settings import Settings, state_folder
+
+    phone = Phone(
+        size=(1480, 1110),
+        lens=Lens(fov=196),
+        circle=Circle(735.0, 562.0, 490.0),
+        evs=(-4.0, -2.0, 0.0, 2.0),
+        listed_errors=((0.0, 0.0, 0.8, 0.0), ()),
+        arcs=(Arc("front", 35, 45, 6, 1.3), Arc("back", 200, 35, 6, 1.0)),
+        falloff=0.2,
+        misalignment=(1.5, -1.0, 0.8),
+        tilt=(2.0, 3.0, -2.0),
+        shake=0.1,
+        jpeg=94,
+    )
+    folder = Path(tempfile.mkdtemp(prefix="lucarne-shots-"))
+    front, back = write_shots(shoot(around(), phone, 1), folder)
+    application = QApplication(sys.argv[:1])
+    settings = Settings(state_folder())
+    settings.set("capture_placed", True)
+    studio = assemble(settings=settings)
+    studio.window.show()
+    panel, dock = studio.window.capture_panel, studio.window.docks["capture"]
+
+    def wait(for_what: Callable[[], bool]) -> None:
+        until = time.monotonic() + 5 * SETTLED
+        while not for_what():
+            if time.monotonic() > until:
+                raise SystemExit("the capture did not come to an end")
+            application.processEvents()
+            time.sleep(0.01)
+
+    panel.reading.take([*front, *back])
+    wait(lambda: panel.desk.capture is not None)
+    dock.setFloating(True)
+    dock.resize(*PANEL)
+    wait(lambda: "captured" in panel.desk.fresh and not studio.context.tasks.running)
+    for step in STEPS_SHOWN:
+        panel.work.go(step)
+        shown_until = time.monotonic() + 3
+        wait(lambda until=shown_until: time.monotonic() > until)
+        shown = dock.grab().toImage().convertToFormat(QImage.Format.Format_RGB888)
+        rows = np.frombuffer(shown.constBits(), np.uint8).reshape(shown.height(), shown.bytesPerLine())
+        pixels = rows[:, : 3 * shown.width()].reshape(shown.height(), shown.width(), 3)
+        Image.fromarray(pixels).save(HERE / f"capture-{step}.webp", quality=86, method=6)
+    studio.close()
+
+
 if __name__ == "__main__":
-    {"room": room, "windows": windows, "window": window, "chair": chair}[sys.argv[1]](*sys.argv[2:])
+    makers = {"room": room, "windows": windows, "window": window, "chair": chair, "capture": capture}
+    makers[sys.argv[1]](*sys.argv[2:])

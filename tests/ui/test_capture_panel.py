@@ -402,6 +402,15 @@ def test_a_cancelled_run_keeps_what_is_there(slow: Wizard, run: FakeRun) -> None
     slow.driver.until(lambda: work.preview.view.remark == "")
 
 
+def test_the_window_closes_while_something_is_computed(slow: Wizard, run: FakeRun) -> None:
+    slow.driver.until(run.started.is_set)
+    desk = slow.desk
+    slow.driver.close()
+    assert desk.executor is not None
+    assert desk.task is None or desk.task.job.cancelled
+    assert not desk.executor._thread.is_alive()
+
+
 def test_what_fails_is_told_where_it_failed(wizard: Wizard, run: FakeRun) -> None:
     run.fail = "registration"
     wizard.desk.apply("lens", "Field of view", fov=200.0)

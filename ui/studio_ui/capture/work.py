@@ -203,7 +203,6 @@ class CaptureWork(QWidget):
         form, view = self.form, self.preview.view
         if view.tool is not form.tool:
             view.set_tool(form.tool)
-        view.setToolTip(form.tool.tip)
         turned = getattr(form, "turned", None)
         view.turn(turned() if turned is not None and view.shown is not None else None)
 

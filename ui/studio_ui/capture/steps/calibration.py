@@ -71,6 +71,8 @@ class CalibrationStep(StepForm):
             group.addButton(button)
             self.column.addWidget(button)
             self.picks[name] = button
+        self.tip = note(PlaceTool.tip)
+        self.column.addWidget(self.tip)
         self.told = note("")
         self.column.addWidget(self.told)
 
@@ -101,6 +103,7 @@ class CalibrationStep(StepForm):
             if not wanted[name] and button.isChecked():
                 button.setChecked(False)
         self.sync()
+        self.tip.setVisible(any(wanted.values()))
         only = [name for name, there in wanted.items() if there]
         if len(only) == 1 and not self.place_tool.picking:
             self.picks[only[0]].setChecked(True)
