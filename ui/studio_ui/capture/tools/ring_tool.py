@@ -71,12 +71,13 @@ class RingTool(Tool):
             colour = QColor(canvas.theme.mark if patch.used else "#b9b9b9")
             chosen = index == self.chosen
             fill = QColor(colour)
-            fill.setAlpha(70 if chosen else 22)
-            painter.setBrush(fill if patch.used else Qt.BrushStyle.NoBrush)
+            fill.setAlpha(40)
+            painter.setBrush(fill if chosen else Qt.BrushStyle.NoBrush)  # what is in it is looked at
             style = Qt.PenStyle.SolidLine if patch.used else Qt.PenStyle.DotLine
             painter.setPen(QPen(QColor(0, 0, 0, 140), 3.5 if chosen else 2.5))
             polygon = self._polygon(canvas, patch)
             painter.drawPolygon(polygon)
+            painter.setBrush(Qt.BrushStyle.NoBrush)
             painter.setPen(QPen(colour, 2.0 if chosen else 1.2, style))
             painter.drawPolygon(polygon)
             if chosen and patch.source == RING:
