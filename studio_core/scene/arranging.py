@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from studio_core.scene.bounds import exact_bounds
+from studio_core.scene.capture import Capture
 from studio_core.scene.nodes import Environment, NodeId, Scene
 from studio_core.scene.transform import Transform, axis_angle, vec3
 
@@ -20,6 +21,8 @@ F64 = npt.NDArray[np.float64]
 Side = Literal["low", "middle", "high"]
 Placed = dict[NodeId, Transform]
 UP = (0.0, 1.0, 0.0)
+PLACELESS = (Environment, Capture)
+"""Kinds of nodes that stand nowhere: nothing moves, groups or copies them."""
 
 
 def is_locked(scene: Scene, node: NodeId) -> bool:
@@ -29,7 +32,7 @@ def is_locked(scene: Scene, node: NodeId) -> bool:
 
 def roots(scene: Scene, nodes: Iterable[NodeId]) -> tuple[NodeId, ...]:
     """Those nodes that can move and do not hang under another one of them."""
-    chosen = [node for node in nodes if node in scene.nodes and not isinstance(scene[node], Environment)]
+    chosen = [node for node in nodes if node in scene.nodes and not isinstance(scene[node], PLACELESS)]
     free = [n for n in chosen if not any(above.id in chosen for above in scene.ancestors(n))]
     return tuple(n for n in free if not is_locked(scene, n))
 

@@ -21,6 +21,7 @@ from studio_core.imaging.photograph import ShotFacts
 from studio_core.imaging.projection import Circle
 from studio_core.project.codec import scene_digest
 from studio_core.project.store import load, save
+from studio_core.scene.arranging import roots
 from studio_core.scene.capture import Capture, KeptPhotograph
 from studio_core.scene.diff import Aspect, diff
 from studio_core.scene.geometry import Image
@@ -121,6 +122,14 @@ def test_a_capture_survives_saving(tmp_path: Path) -> None:
     data = made.photographs[0].data
     assert data is not None
     assert data.pixels.tobytes() == b"a.jpg" * 9
+
+
+def test_a_capture_stands_nowhere() -> None:
+    document, capture = _with_capture(little_scene())
+    assert roots(document.scene, (capture,)) == ()
+    assert roots(document.scene, tuple(document.scene.nodes)) == roots(
+        document.scene, tuple(little_scene().nodes)
+    )
 
 
 def test_what_is_no_capture_is_refused() -> None:

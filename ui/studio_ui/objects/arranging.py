@@ -9,9 +9,9 @@ from typing import Literal
 import numpy as np
 
 from studio_core.edits import Compound, Edit, Move, duplicate, with_own_materials
-from studio_core.scene.arranging import Placed, Side, aligned, distributed, roots, shifted
+from studio_core.scene.arranging import PLACELESS, Placed, Side, aligned, distributed, roots, shifted
 from studio_core.scene.bounds import exact_bounds
-from studio_core.scene.nodes import Environment, MeshObject, NodeId, Scene
+from studio_core.scene.nodes import MeshObject, NodeId, Scene
 from studio_core.scene.standing import dropped
 from studio_ui.canvas import navigation
 from studio_ui.canvas.drags import called, named
@@ -65,7 +65,7 @@ class Arranging:
     def duplicate(self, *, own_materials: bool = False) -> None:
         """Copies to the right of the originals, as it is seen; they are chosen then."""
         scene = self._scene
-        nodes = tuple(n for n in self._chosen if not isinstance(scene[n], Environment))
+        nodes = tuple(n for n in self._chosen if not isinstance(scene[n], PLACELESS))
         if not nodes:
             return
         right, _ = navigation.nudge_axes(self._context.session.view)

@@ -9,8 +9,8 @@ import numpy as np
 
 from studio_core.edits import Add, Compound, Edit, Move, Remove, Reparent, SetFields
 from studio_core.photographs import stand_in_photograph
-from studio_core.scene.arranging import is_locked, roots, shifted, turned
-from studio_core.scene.nodes import Environment, Group, NodeId, Scene, new_id
+from studio_core.scene.arranging import PLACELESS, is_locked, roots, shifted, turned
+from studio_core.scene.nodes import Group, NodeId, Scene, new_id
 from studio_core.scene.transform import Transform
 from studio_ui.canvas import navigation
 from studio_ui.canvas.drags import middle, named
@@ -108,7 +108,7 @@ class Commands:
     def group(self) -> None:
         """A new group around what is chosen."""
         scene = self._context.document.scene
-        nodes = tuple(n for n in self.chosen if not isinstance(scene[n], Environment))
+        nodes = tuple(n for n in self.chosen if not isinstance(scene[n], PLACELESS))
         if not nodes:
             return
         made = Group(id=new_id("group"), name="Group", parent=scene[nodes[0]].parent)

@@ -10,9 +10,9 @@ from PySide6.QtWidgets import QPushButton, QWidget
 
 from studio_core.edits import Assign, Compound
 from studio_core.params import ParamInfo, param_infos
-from studio_core.scene.capture import Capture
+from studio_core.scene.arranging import PLACELESS
 from studio_core.scene.diff import Changes
-from studio_core.scene.nodes import Environment, MaterialId, MeshObject, Node, NodeId, Scene
+from studio_core.scene.nodes import MaterialId, MeshObject, Node, NodeId, Scene
 from studio_core.scene.room import SLOTS, Room
 from studio_ui.capture.feature import capture_behind
 from studio_ui.context import Context
@@ -105,7 +105,7 @@ class PropertiesPanel(Panel):
         if len(nodes) == 1 and capture_behind(scene, nodes[0].id) is not None:
             self.edit_capture = self._capture_button()
             self._column.addWidget(self.edit_capture)
-        if not any(isinstance(node, Capture | Environment) for node in nodes):
+        if not any(isinstance(node, PLACELESS) for node in nodes):
             self._column.addWidget(heading("Place"))
             self.place = PlaceEditor(self.context)
             self._column.addWidget(self.place)
