@@ -36,6 +36,7 @@ MOST_SHIFT = 0.1  # of the longer side
 MOST_DOUBT = 2e-3  # of the longer side: standard deviation of the worst direction's shift
 _FINEST = 1000  # pixels across the finest size that is compared
 _WANDERED = 1.5  # pixels of the size that is believed, to where the finest ends
+_LOOKED_AROUND = 150  # pixels across the largest size at which other starts are tried
 _SEARCHED = 260  # pixels across the largest size that is seen with its clipped parts
 
 
@@ -118,7 +119,7 @@ class _Bracket:
     def _begun(self, fit: Fit, seen: Seen, level: Level, motion: Motion, cut: bool) -> Found:
         """The best start at the smallest size: at rest against the other frame, or all around."""
         best = fit.improved(seen, level, motion, 8, cut)
-        if best.correlation > 0.85:
+        if best.correlation > 0.85 or max(fit.place.size) > _LOOKED_AROUND:
             return best
         tried = [
             fit.improved(seen, level, fit.place.after(motion, fit.place.values(start)), 2, cut)

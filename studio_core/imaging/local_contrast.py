@@ -65,8 +65,8 @@ def sizes_of(frame: npt.NDArray[Any], box: tuple[int, int, int, int], finest: in
     step = factor * 2 ** (count - 1)
     width, height = -(-(right - left) // step) * step, -(-(bottom - top) // step) * step
     cut = frame[max(top, 0) : top + height, max(left, 0) : left + width]
-    middle = _middle(cut)
-    unclipped = (cut.max(axis=2) < _clipped_from(cut, middle)).astype(np.float32)
+    middle, most = _middle_and_most(cut)
+    unclipped = (most < _clipped_from(middle)).astype(np.float32)
     numbers = middle.astype(np.float32)
     if frame.dtype.kind == "f":
         numbers = np.nan_to_num(numbers, nan=0.0, posinf=0.0, neginf=0.0)
@@ -116,15 +116,16 @@ def normalised(level_log: F32, valid: F32, noise: float) -> tuple[F32, F32]:
     return made, sure
 
 
-def _middle(cut: npt.NDArray[Any]) -> npt.NDArray[Any]:
-    """The median of three channels: as long as one is usable on either side, it is."""
+def _middle_and_most(cut: npt.NDArray[Any]) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]:
+    """The median of three channels, which is usable as long as one is on either side, and the largest."""
     import cv2
 
     a, b, c = (np.ascontiguousarray(cut[..., i]) for i in range(3))
-    return np.asarray(cv2.max(cv2.min(a, b), cv2.min(cv2.max(a, b), c)))
+    low, high = cv2.min(a, b), cv2.max(a, b)
+    return np.asarray(cv2.max(low, cv2.min(high, c))), np.asarray(cv2.max(high, c))
 
 
-def _clipped_from(cut: npt.NDArray[Any], middle: npt.NDArray[Any]) -> float:
+def _clipped_from(middle: npt.NDArray[Any]) -> float:
     """The number from which on pixels count as clipped: a plateau at the top, or nearly the type's top."""
     some = middle[::3, ::3]
     if some.dtype.kind == "f":

@@ -19,7 +19,17 @@ import numpy.typing as npt
 from studio_core.capturing.artifacts import FoundCircle
 from studio_core.imaging.projection import Circle
 from studio_core.shading.job import Job
-from studio_plugins.capture.circle_edge import CLOSE, WIDE, fitted, in_stops, rings, rough_light, steps_inside
+from studio_plugins.capture.circle_edge import (
+    AGAIN,
+    CLOSE,
+    WIDE,
+    changes,
+    fitted,
+    in_stops,
+    rings,
+    rough_light,
+    steps_inside,
+)
 
 F32 = npt.NDArray[np.float32]
 F64 = npt.NDArray[np.float64]
@@ -28,6 +38,8 @@ _FINE, _COARSE = 1400, 360  # pixels across the pictures that are worked on
 _LEVELS = 9
 _TRIALS = 150
 _BEST = 6  # candidates that are fitted
+_WEIGHTS = (2.6, 1.8, -0.4, 1.9, 1.4, -1.1, -2.1, -0.9, -4.1, -1.0)
+_LOOKED_INTO = 4  # of these, for an edge inside
 
 
 @dataclass(frozen=True)
@@ -62,28 +74,26 @@ def find_circles(
     """
     light, factor = rough_light(pictures, _FINE)
     if job is not None:
-        job.checkpoint(1, 4)
+        job.checkpoint(1, 8)
     stops = in_stops(light)
     small, shrink = _smaller(stops)
     proposals = _proposals(small)
     if job is not None:
-        job.checkpoint(2, 4)
+        job.checkpoint(2, 8)
     scored = _distinct([_scored(small, one, 180) for one in proposals])[:_BEST]
-    refined: list[_Scored] = []
+    refined = []
     for place, one in enumerate(scored):
-        outer = _refined(light, stops, one.circle.scaled(shrink), WIDE)
-        refined.append(outer)
-        if place < 3:
-            c = outer.circle
-            refined += [
-                _refined(light, stops, Circle(c.x, c.y, c.radius * reach), CLOSE)
-                for reach in steps_inside(stops, c)
-            ]
+        refined.append(_refined(light, stops, one.circle.scaled(shrink), WIDE))
         if job is not None:
-            job.checkpoint(2 * _BEST + 2 * place, 4 * _BEST)
+            job.checkpoint(_BEST + place, 4 * _BEST)
+    refined = _distinct(refined)
+    for place, one in enumerate(refined[:_LOOKED_INTO]):
+        refined += _inside(light, stops, one.circle)
+        if job is not None:
+            job.checkpoint(2 * _BEST + place, 4 * _BEST)
     refined = _distinct(refined)
     height, width = light.shape
-    chosen = _chosen(refined, count, width, height)
+    chosen = _chosen(refined, count, width, height, stops)
     return tuple(FoundCircle(one.circle.scaled(factor), _confidence(one, refined)) for one in chosen)
 
 
@@ -161,6 +171,16 @@ def _of_three(a: F64, b: F64, c: F64) -> F64:
     return np.asarray(made[np.isfinite(made).all(axis=1)], np.float64)
 
 
+def _inside(light: F32, stops: F32, circle: Circle) -> list[_Scored]:
+    """Other edges a little inside of one: of a rim, or where flare pulled it out to one side."""
+    tried = [_refined(light, stops, _shrunk(circle, by), AGAIN) for by in (0.975, 0.95)]
+    return tried + [_refined(light, stops, _shrunk(circle, by), CLOSE) for by in steps_inside(stops, circle)]
+
+
+def _shrunk(circle: Circle, by: float) -> Circle:
+    return Circle(circle.x, circle.y, circle.radius * by)
+
+
 def _refined(light: F32, stops: F32, circle: Circle, windows: Sequence[float]) -> _Scored:
     fit = fitted(light, circle, windows)
     made = _scored(stops, fit.circle, 360)
@@ -181,10 +201,7 @@ def _scored(stops: F32, circle: Circle, around: int) -> _Scored:
     lit = within >= 0.25 * np.median(within)
     rest = np.nanmean(np.where(np.isnan(beyond), outside[:, 1:2], beyond), axis=1)
     dark = 1 - float(np.mean(np.clip(rest[lit] / np.maximum(within[lit], 0.1), 0, 1)))
-    details = []
-    for ring in (inside[:, 5:], outside[:, :4]):
-        change = np.minimum(np.abs(np.roll(ring, -max(1, around // 90), axis=0) - ring), 2)
-        details.append(float(np.nanmean(change)) if not np.isnan(change).all() else 0.0)
+    details = [float(changes(ring).mean()) for ring in (inside[:, 5:], outside[:, :4])]
     detail = (details[0] - details[1]) / (details[0] + details[1] + 0.1)
     return _Scored(circle, float(np.clip(drop, -1, 4).mean()), detail, dark, float(valid.mean()))
 
@@ -198,16 +215,33 @@ def _distinct(circles: list[_Scored]) -> list[_Scored]:
     return kept
 
 
-def _innermost(best: _Scored, found: list[_Scored]) -> _Scored:
-    """`best`, or an edge a little inside of it with detail to itself: then the other is a shiny rim's."""
+def _innermost(best: _Scored, found: list[_Scored], stops: F32) -> _Scored:
+    """`best`, or the edge a little inside of it where nothing is to be seen between: `best` is a rim's."""
     for one in sorted(found, key=lambda o: o.circle.radius):
         inner, outer = one.circle, best.circle
-        within = math.hypot(inner.x - outer.x, inner.y - outer.y) < 0.03 * outer.radius
-        if not within or not 0.8 * outer.radius < inner.radius < outer.radius:
+        within = math.hypot(inner.x - outer.x, inner.y - outer.y) < 0.04 * outer.radius
+        if not within or not 0.8 * outer.radius < inner.radius < 0.99 * outer.radius:
             continue
-        if one.edge > (0.25 if one.detail > best.detail + 0.15 else 0.6) * max(best.edge, 0.6):
+        if one.edge > 0.6 * max(best.edge, 0.6) or (one.edge > 0.08 and _empty_between(stops, inner, outer)):
             return one
     return best
+
+
+def _empty_between(stops: F32, inner: Circle, outer: Circle) -> bool:
+    """Whether a dark gap lies between two circles, or little is to be seen there against the inside."""
+    first, last = 1.012, outer.radius / inner.radius - 0.012
+    if last <= first:
+        return False
+    profile = rings(stops, inner, np.linspace(0.96, outer.radius / inner.radius * 0.995, 24), 360)
+    profile = profile[~np.isnan(profile).any(axis=1)]
+    inside = np.median(profile[:, :6], axis=1)[:, None]
+    behind = np.maximum.accumulate(profile[:, ::-1], axis=1)[:, ::-1]
+    gap = (np.minimum(inside, behind) - profile)[:, 6:].max(axis=1)
+    if len(gap) and np.mean(gap > 0.5) > 0.5:
+        return True
+    seen = changes(rings(stops, inner, np.linspace(0.94, 0.985, 5), 360)).mean()
+    between = changes(rings(stops, inner, np.linspace(first, last, 5), 360)).mean()
+    return bool(seen > 0.05 and between < 0.55 * seen)
 
 
 def _apart(first: Circle, second: Circle) -> float:
@@ -216,8 +250,8 @@ def _apart(first: Circle, second: Circle) -> float:
     return (centres + abs(first.radius - second.radius)) / second.radius
 
 
-def _chosen(found: list[_Scored], count: int | None, width: int, height: int) -> list[_Scored]:
-    best = _innermost(found[0], found)
+def _chosen(found: list[_Scored], count: int | None, width: int, height: int, stops: F32) -> list[_Scored]:
+    best = _innermost(found[0], found, stops)
     if count == 1 or (count is None and max(width, height) < 1.4 * min(width, height)):
         return [best]
     pairs = [
@@ -230,7 +264,7 @@ def _chosen(found: list[_Scored], count: int | None, width: int, height: int) ->
     ]
     if pairs:
         pair = max(pairs, key=lambda p: p[0].score + p[1].score)
-        pair = (_innermost(pair[0], found), _innermost(pair[1], found))
+        pair = (_innermost(pair[0], found, stops), _innermost(pair[1], found, stops))
         if count == 2 or min(p.score for p in pair) > 0.6 * best.score:
             across = abs(pair[0].circle.x - pair[1].circle.x) >= abs(pair[0].circle.y - pair[1].circle.y)
             return sorted(pair, key=lambda p: p.circle.x if across else p.circle.y)
@@ -242,18 +276,33 @@ def _chosen(found: list[_Scored], count: int | None, width: int, height: int) ->
 
 
 def _confidence(one: _Scored, others: list[_Scored]) -> float:
-    """0 … 1 that it is right within a hundredth of its radius; measured on simulated photographs."""
-    rivals = [o.score for o in others if _overlap(o.circle, one.circle) and o is not one]
-    margin = (one.score - max(rivals, default=0.0)) / max(one.score, 1e-6)
-    parts = (
-        min(one.edge / 0.5, 1.0),
-        min(max(one.drop, 0.0), 1.0),
-        min(max((one.dark - 0.3) / 0.2, 0.0), 1.0),
-        min(max(one.detail + 0.4, 0.0) / 0.5, 1.0),
-        1 / (1 + (one.spread / 0.006) ** 2),
-        min(max(0.3 + 3 * margin, 0.0), 1.0),
+    """0 … 1 that centre and radius are right within a hundredth, by a logistic model (`_WEIGHTS`)."""
+    if one.edge <= 0:
+        return 0.02
+    return 1 / (1 + math.exp(-sum(w * e for w, e in zip(_WEIGHTS, _evidence(one, others), strict=True))))
+
+
+def _evidence(one: _Scored, others: list[_Scored]) -> tuple[float, ...]:
+    """What speaks for a circle: 1, then numbers of about 0 … 1."""
+    rivals = [o for o in others if o is not one and _overlap(o.circle, one.circle)]
+    outer = [o for o in rivals if o.circle.radius > 1.01 * one.circle.radius]
+    inner = [o for o in rivals if o.circle.radius < 0.99 * one.circle.radius]
+
+    def against(some: list[_Scored]) -> float:
+        return min(max((o.score for o in some), default=0.0) / max(one.score, 1e-3), 1.5)
+
+    return (
+        1.0,
+        one.edge,
+        min(one.drop, 3.0) / 3,
+        one.detail,
+        one.dark,
+        min(one.seen / 0.5, 1.0),
+        min(one.spread / 0.004, 1.5),
+        against(outer),
+        against(inner),
+        against([o for o in rivals if o not in outer and o not in inner]),
     )
-    return math.sqrt(float(np.prod(parts)))
 
 
 def _overlap(first: Circle, second: Circle) -> bool:

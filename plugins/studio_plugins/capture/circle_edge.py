@@ -75,13 +75,14 @@ def in_stops(light: F32) -> F32:
     """log2 of light above its darkness: 0 where nothing but noise is, however dark the room."""
     import cv2
 
+    light = np.asarray(cv2.GaussianBlur(light, (0, 0), 0.8), np.float32)
     kernel = np.array([[1, -2, 1], [-2, 4, -2], [1, -2, 1]], np.float32) / 6
     rough = np.abs(cv2.filter2D(light, -1, kernel))
     dark = light <= np.quantile(light, 0.2)
     noise = float(np.median(rough[dark])) / 0.6745
     black = float(np.quantile(light, 0.01))
     bright = float(np.quantile(light, 0.75)) - black
-    floor = max(3 * noise, 0.004 * bright, 1e-12)
+    floor = max(12 * noise, 0.004 * bright, 1e-12)  # the blur leaves noise that the mask hardly sees
     return np.asarray(np.log2(np.maximum(light - np.float32(black), 0) / np.float32(floor) + 1), np.float32)
 
 
@@ -112,7 +113,7 @@ class Fit:
     spread: float
 
 
-WIDE, CLOSE = (0.05, 0.03, 0.02, 0.012, 0.012), (0.012, 0.009, 0.009)
+WIDE, AGAIN, CLOSE = (0.05, 0.03, 0.02, 0.012, 0.012), (0.03, 0.02, 0.012, 0.009), (0.012, 0.009, 0.009)
 
 
 def fitted(light: F32, circle: Circle, windows: Sequence[float] = WIDE) -> Fit:
@@ -127,10 +128,12 @@ def fitted(light: F32, circle: Circle, windows: Sequence[float] = WIDE) -> Fit:
             continue  # the picture's border may leave room for a narrower window
         radius = found.circle.radius
         close = max(0.004 * radius, 1.2)
-        change = _circle_step(angle, edge, contrast, window * radius, close)
+        sharp = max(float(np.quantile(width, 0.2)), _PIXEL)
+        weight = contrast / (1 + (width / (2.5 * sharp)) ** 2)  # flare fades, an edge ends
+        change = _circle_step(angle, edge, weight, window * radius, close)
         moved = Circle(found.circle.x + change[0], found.circle.y + change[1], radius + change[2])
         off = np.abs(edge - (change[2] + np.cos(angle) * change[0] + np.sin(angle) * change[1]))
-        near = off < close
+        near = (off < close) & (width < 4 * sharp)
         spread = float(np.median(off[near])) / radius if near.any() else 1.0
         found = Fit(moved, float(np.count_nonzero(near)) / _AROUND, spread)
         wide = max(float(np.median(width[near])), _PIXEL) if near.any() else _PIXEL
@@ -216,9 +219,9 @@ def _circle_step(angle: F64, edge: F64, contrast: F64, window: float, close: flo
 
 
 def steps_inside(stops: F32, circle: Circle) -> list[float]:
-    """Where else light falls towards the outside, on circles about the same centre: radii, in radii.
+    """Where light or detail ends too, on circles about the same centre: radii, in radii.
 
-    A shiny rim ends the light too, and further out than the picture.
+    A shiny rim ends the light further out than the picture does, but nothing can be seen in it.
     """
     reach = np.arange(0.82, 1.0, 0.003)
     profile = rings(stops, circle, reach, 360)
@@ -226,11 +229,26 @@ def steps_inside(stops: F32, circle: Circle) -> list[float]:
     if np.count_nonzero(known) < 40:
         return []
     fall = profile[known, :-4] - profile[known, 4:]  # over 1.2 % of the radius
-    typical = np.quantile(np.clip(fall, -2, 3), (0.3, 0.5), axis=0).mean(axis=0)
-    peaks = [
+    darker = np.quantile(np.clip(fall, -2, 3), (0.3, 0.5), axis=0).mean(axis=0)
+    detail = np.convolve(changes(profile), np.full(4, 0.25), mode="same")
+    before, after = detail[:-8], detail[8:]
+    emptier = np.where(after < 0.6 * before, before - after, 0.0)[2:-2]
+    made = [*_peaks(darker, 0.3, reach[:-4] + 0.006), *_peaks(emptier, 0.03, reach[2:-10] + 0.012)]
+    return [r for r in made if r < 0.988]
+
+
+def changes(profile: F32) -> F64:
+    """(n,) how much there is to be seen in rings (around, n): mean change over 4°, in stops, at most 2."""
+    change = np.minimum(np.abs(np.roll(profile, -max(1, len(profile) // 90), axis=0) - profile), 2)
+    seen = ~np.isnan(change)
+    total = np.where(seen, change, 0).sum(axis=0, dtype=np.float64)
+    return np.asarray(total / np.maximum(seen.sum(axis=0), 1), np.float64)
+
+
+def _peaks(values: F64, least: float, at: F64) -> list[float]:
+    found = [
         i
-        for i in range(1, len(typical) - 1)
-        if typical[i] >= typical[i - 1] and typical[i] > typical[i + 1] and typical[i] > 0.3
+        for i in range(1, len(values) - 1)
+        if values[i] >= values[i - 1] and values[i] > values[i + 1] and values[i] > least
     ]
-    best = sorted(peaks, key=lambda i: -typical[i])[:3]
-    return [float(reach[i] + 0.006) for i in best if reach[i] < 0.982]
+    return [float(at[i]) for i in sorted(found, key=lambda i: -values[i])[:3]]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
@@ -167,12 +168,13 @@ def test_flare_over_a_part_of_the_edge_does_not_move_it() -> None:
     assert apart(found.circle, ONE) < 0.01
 
 
-@pytest.mark.parametrize("seed", [1, 2])
-def test_a_shiny_rim_is_not_the_edge(seed: int) -> None:
+@pytest.mark.parametrize(("seed", "bright"), [(1, 0.1), (2, 1.0)])
+def test_a_shiny_rim_is_not_the_edge(seed: int, bright: float) -> None:
+    """Not even one that outshines the room."""
     light = light_of([ONE], SIZE, seed)
     points = pixel_points(SIZE[1], SIZE[0])
     reach = np.hypot(points[..., 0] - ONE.x, points[..., 1] - ONE.y) / ONE.radius
-    rim = 0.1 * np.exp(-(((reach - 1.05) / 0.008) ** 2))
+    rim = bright * np.exp(-(((reach - 1.05) / 0.008) ** 2))
     light += rim[..., None].astype(np.float32)
     (found,) = find_circles(bracket(light), 1)
     assert apart(found.circle, ONE) < 0.01
@@ -193,6 +195,23 @@ def test_where_there_is_no_circle_it_is_not_confident() -> None:
         assert found.confidence < 0.5
         assert math.isfinite(found.circle.x + found.circle.y)
         assert found.circle.radius > 0
+
+
+def test_real_fisheyes(shared_data: Path) -> None:
+    """A luminance camera's fills its square picture; a photograph's fades out beyond it, with flare."""
+    import cv2
+
+    from studio_core.imaging.io import read_image
+
+    square = read_image(shared_data / "third_party/radiance_bsd/testimage.hdr").pixels
+    (found,) = find_circles([square], 1)
+    assert apart(found.circle, Circle(393, 393, 393)) < 0.006
+    photo = cv2.imread(str(shared_data / "third_party/fisheye_ocamcalib_mit/ocamcamera/img0.jpg"))
+    assert photo is not None
+    (found,) = find_circles([photo], 1)
+    calibrated = Circle(798.7, 794.8, found.circle.radius)  # the centre is its calibration's
+    assert apart(found.circle, calibrated) < 0.01
+    assert 790 < found.circle.radius < 850
 
 
 def test_it_can_be_cancelled_and_reports() -> None:
