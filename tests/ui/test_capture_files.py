@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 from capture_support import FakeCapturer, FakeRun, bracket, plugin
 from drag_support import Drag, files, on_canvas
@@ -178,6 +179,18 @@ def test_what_a_drop_of_pictures_means(tmp_path: Path) -> None:
     assert not intent_of(put("a.jpg", "b.jpg", "chair.obj"), (".obj",)).capture
     assert set(CAMERAS) <= set(READABLE)
     assert not set(CAMERAS) & {*HDR, *PHOTOGRAPHS}
+
+
+def test_two_circles_in_one_picture_are_no_environment(tmp_path: Path) -> None:
+    around = np.random.default_rng(1).integers(60, 255, (100, 200, 3)).astype(np.uint8)
+    Pillow.fromarray(around).save(tmp_path / "around.jpg")
+    y, x = np.mgrid[:100, :200] + 0.5
+    inside = (np.hypot(x - 50, y - 50) < 46) | (np.hypot(x - 150, y - 50) < 46)
+    Pillow.fromarray(around * inside[..., None].astype(np.uint8)).save(tmp_path / "dual.jpg")
+    assert intent_of([tmp_path / "around.jpg"], ()).light is not None
+    meant = intent_of([tmp_path / "dual.jpg"], ())
+    assert meant.capture
+    assert meant.told(here=False, options=False) == "Capture the room's light from 1 photograph"
 
 
 def test_an_environment_knows_its_capture(driver: Driver, shots: list[Path]) -> None:

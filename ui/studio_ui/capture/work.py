@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from PySide6.QtCore import Qt
+from PySide6.QtCore import Qt, QTimer
 from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import (
     QLabel,
@@ -215,7 +215,13 @@ class CaptureWork(QWidget):
         self.steps.set_small(small)
         self.split.setOrientation(Qt.Orientation.Vertical if small else Qt.Orientation.Horizontal)
         self.split.insertWidget(0, self.preview if small else self._side)
-        self.split.setSizes([3 * _FORMS, 2 * _FORMS] if small else [_FORMS, self.width() - _FORMS])
+        QTimer.singleShot(0, self, self._share_room)  # once both have their new shapes
+
+    def _share_room(self) -> None:
+        if self._small:
+            self.split.setSizes([self.height() * 11 // 20, self.height() * 9 // 20])
+        else:
+            self.split.setSizes([_FORMS, self.width() - _FORMS])
 
 
 def _alike(one: tuple[object, ...], other: tuple[object, ...]) -> bool:

@@ -6,7 +6,7 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from PySide6.QtCore import QMimeData
+from PySide6.QtCore import QMimeData, QSize
 from PySide6.QtGui import QImageReader
 
 from studio_ui.files.project_files import SUFFIX
@@ -19,6 +19,7 @@ CAMERAS = (
 )
 """Files of cameras that are photographs of a room and nothing else."""
 PHOTOGRAPHS = (".png", ".jpg", ".jpeg", ".webp", ".bmp")
+_SMALL, _BLACK = (64, 32), 48  # size that is looked at, and what is dark of 255
 _TWICE = 0.02  # how far from 2:1 the sides of an equirectangular picture may be
 
 
@@ -50,7 +51,8 @@ class Intent:
         if self.project is not None:
             return f"Open {self.project.stem}"
         if self.capture:
-            return f"Capture the room's light from {len(self.capture)} photographs"
+            count = len(self.capture)
+            return f"Capture the room's light from {count} photograph{'s' * (count > 1)}"
         parts = []
         if self.models:
             what = self.models[0].stem if len(self.models) == 1 else f"{len(self.models)} models"
@@ -103,6 +105,8 @@ def intent_of(paths: Sequence[Path], known: Collection[str]) -> Intent:
             return Intent(problem=f"{path.name} is no model, picture of light or project that can be read.")
     if lights and not models and _photographs(lights):
         return Intent(capture=tuple(lights))
+    if len(lights) == 1 and not models and _two_circles(lights[0]):
+        return Intent(capture=tuple(lights))
     if len(lights) > 1:
         return Intent(problem="One picture of light is dropped at a time.")
     if lights and lights[0].suffix.lower() in PHOTOGRAPHS:
@@ -111,6 +115,23 @@ def intent_of(paths: Sequence[Path], known: Collection[str]) -> Intent:
             return Intent(problem=problem)
         return Intent(models=tuple(models), light=lights[0], photograph=True)
     return Intent(models=tuple(models), light=lights[0] if lights else None)
+
+
+def _two_circles(path: Path) -> bool:
+    """Whether a picture twice as wide as high shows two round ones: dark in its corners and between them."""
+    if path.suffix.lower() not in PHOTOGRAPHS:
+        return False
+    reader = QImageReader(str(path))
+    size = reader.size()
+    if not size.isValid() or abs(size.width() - 2 * size.height()) > _TWICE * size.width():
+        return False
+    reader.setScaledSize(QSize(*_SMALL))
+    image = reader.read()
+    if image.isNull():
+        return False
+    wide, high = _SMALL
+    places = [(x, y) for y in (1, high - 2) for x in (1, wide // 2 - 1, wide // 2, wide - 2)]
+    return all(max(image.pixelColor(*place).getRgb()[:3]) < _BLACK for place in places)
 
 
 def _photographs(paths: Sequence[Path]) -> bool:
@@ -142,6 +163,6 @@ def _no_environment(path: Path) -> str:
     if abs(size.width() - 2 * size.height()) > _TWICE * size.width():
         return (
             f"{path.name} is an ordinary photograph of {size.width()} × {size.height()}: "
-            "light needs a picture all around, twice as wide as high."
+            "light needs a picture all around, twice as wide as high, or several exposures of a room."
         )
     return ""

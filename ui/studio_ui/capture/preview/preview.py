@@ -22,7 +22,7 @@ from studio_ui.look.theme import GAP, Theme
 _EXPOSURE = ParamInfo(
     "number", "Exposure", "How bright the preview is; changes nothing but what is shown", "EV", -16.0, 16.0
 )
-_NARROW = 520  # pixels, under which the histogram and the pixel share less
+_NARROW, _LOW = 520, 360  # pixels of the preview, under which there is no room for the histogram
 _LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 
 
@@ -136,8 +136,8 @@ class Preview(QWidget):
             self._show_exposure(self._exposures[shown.encoded] or 0.0)
 
     def resizeEvent(self, event: QResizeEvent) -> None:
-        """Where it is narrow the histogram goes."""
-        self.histogram.setVisible(self.width() >= _NARROW)
+        """Where it is small the histogram goes."""
+        self.histogram.setVisible(self.width() >= _NARROW and self.height() >= _LOW)
 
     def _elsewhere(self, work: Callable[[], None], done: Callable[[], None]) -> None:
         self._context.tasks.run("Preview", lambda job: work(), lambda _: done(), quiet=True)
