@@ -298,7 +298,7 @@ def parser() -> argparse.ArgumentParser:
         one.add_argument("name", metavar="NAME", help="which one; an unknown name lists them")
         one.add_argument("--quick", action="store_true", help="within 3 minutes")
         one.add_argument("--json", type=Path, metavar="OUT", help="write the rows here, after every case")
-    only = "of cuts: only cases of these names, such as 'sun/*,settle*'"
+    only = "of cuts and capture: only cases of these names, such as 'sun/*,settle*'"
     bench.add_argument("--only", default="*", metavar="PATTERNS", help=only)
     growth = "of cuts: all sizes, up to 100,000 vertices and 2^15 directions, or none"
     bench.add_argument("--growth", choices=("full", "quick", "none"), default="full", help=growth)

@@ -289,6 +289,7 @@ UNITS = {
     "pixel_log2_median": "stop",
     "pixel_log2_p95": "stop",
     "registration_deg": "°",
+    "registration_seen_deg": "°",
     "fov_error": "°",
     "arcs_log2_mean": "stop",
     "response_log2": "stop",
@@ -317,6 +318,7 @@ def measured(
     }
     if state.registration is not None:
         values["registration_deg"] = measure.angle_between(state.registration.rotation, truth.rotation)
+        values["registration_seen_deg"] = measure.angle_between(state.registration.rotation, truth.seen)
         values["fov_error"] = abs(state.registration.lens.fov - truth.phone.lens.fov)
     if state.response is not None:
         response = measure.response_error(state.response, truth.phone.curve)

@@ -7,6 +7,7 @@ that falls on the sensor, which is quicker. `studio.bench.phone_random` draws ph
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -122,6 +123,7 @@ class SideTruth:
 class Truth:
     """`rotation` (3, 3): front lens' frame from the back lens'; `room_from_front`: the map's frame from it.
 
+    `seen`: the rotation that brings what both lenses see together best, which parallax makes another one.
     `reference`: index of the shot that does not shake (the middle one). `clipped`: share of the map's energy
     that is beyond what the darkest shot of both sides resolves. `scale`: exposure of light 1 at EV 0.
     """
@@ -131,6 +133,7 @@ class Truth:
     room_from_front: F64
     front: SideTruth
     back: SideTruth
+    seen: F64
     reference: int = 0
     clipped: float = 0.0
     scale: float = 1.0
@@ -173,7 +176,9 @@ def lens_light(environment: F32, phone: Phone, seed: int = 0) -> Truth:
         sides[side] = SideTruth(rays.circle, with_arcs, clean, stops, moved > 0)
     front = poses[FRONT].rotation
     rotation = front.T @ poses[BACK].rotation
-    return Truth(phone, rotation, front, sides[FRONT], sides[BACK])
+    return Truth(
+        phone, rotation, front, sides[FRONT], sides[BACK], seen_rotation(room, poses, phone.lens.half)
+    )
 
 
 def shoot(environment: F32, phone: Phone, seed: int = 0) -> Shots:
@@ -266,6 +271,24 @@ def _with_glare(phone: Phone, rays: Rays, light: F32) -> F32:
     ring = np.exp(-(((reach - 1.045) / 0.008) ** 2)) * phone.ring
     made += 2 * spread * (ring * (reach >= 1))[:, :, None]
     return np.asarray(made, np.float32)
+
+
+def seen_rotation(room: Room, poses: Mapping[str, Pose], half: float) -> F64:
+    """(3, 3) front lens' frame from the back lens', least squares over what both see (Kabsch 1976)."""
+    rng = np.random.default_rng(0)
+    way = rng.normal(size=(20_000, 3))
+    way /= np.linalg.norm(way, axis=1, keepdims=True)
+    lens_ways = []
+    for pose in (poses[FRONT], poses[BACK]):
+        lens_way = (way - room.near(way)[:, None] * pose.offset) @ pose.rotation
+        lens_ways.append(lens_way / np.linalg.norm(lens_way, axis=1, keepdims=True))
+    front, back = lens_ways
+    both = (front[:, 2] < -np.cos(half)) & (back[:, 2] < -np.cos(half))
+    if both.sum() < 3:
+        return np.asarray(poses[FRONT].rotation.T @ poses[BACK].rotation, np.float64)
+    u, _, v = np.linalg.svd(front[both].T @ back[both])
+    turned = np.diag([1.0, 1.0, float(np.linalg.det(u @ v))])
+    return np.asarray(u @ turned @ v, np.float64)
 
 
 def exposure_scale(truth: Truth) -> float:

@@ -141,6 +141,16 @@ def test_parallax_moves_what_both_lenses_see_by_as_much_as_asked() -> None:
     assert change.max() > np.abs(moved.front.light - still.front.light)[44:54, 56:66].max()
 
 
+def test_parallax_turns_what_both_lenses_see() -> None:
+    still, moved = (
+        lens_light(room(16), replace(SMALL, parallax=p, misalignment=(1, 2, -1)), 4) for p in (0.0, 2.5)
+    )
+    np.testing.assert_allclose(still.seen, still.rotation, atol=1e-9)
+    turned = np.degrees(np.arccos((np.trace(moved.seen.T @ moved.rotation) - 1) / 2))
+    assert 0.01 < turned < 2.5
+    assert np.linalg.det(moved.seen) == pytest.approx(1)
+
+
 def test_what_moves_is_marked_and_in_the_photographs() -> None:
     phone = replace(SMALL, mover=8.0, read_noise=0, full_well=1e12)
     moving, still = shoot(room(), phone, 2), shoot(room(), replace(phone, mover=0), 2)
