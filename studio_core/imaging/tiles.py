@@ -23,6 +23,9 @@ F64 = npt.NDArray[np.float64]
 _CANDIDATES = 9000
 _STRATA = 20
 _A_STRATUM = 4
+_LARGEST = 28  # pixels a side
+_ENOUGH = 1000  # places beside each other
+_NOISY = 0.012  # of a tile's mean, relative: from here on noise would flatten the curve
 _EXPOSURES = 6  # of more, fewer places each
 _CELLS = 6  # a side
 
@@ -65,9 +68,29 @@ def look_up(
     circle: Circle | None = None,
     lens: Lens | None = None,
 ) -> Tiles:
-    """Candidates on a grid over frames (H, W, 3) of one size and type."""
+    """Candidates on a grid over frames (H, W, 3) of one size and type; larger ones where noise is."""
     height, width = frames[0].shape[:2]
     side = min(tile_size(width, height), height, width)
+    while True:
+        tiles = _of_size(frames, motions, levels, circle, lens, side)
+        chosen = tiles.chosen(choose(tiles))
+        noise = np.sqrt(chosen.variance) / (side * np.maximum(chosen.number, 1e-3))
+        if 2 * side > _LARGEST or width * height < _ENOUGH * (2 * side) ** 2:
+            return tiles
+        if not chosen.fair.any() or np.median(noise[chosen.fair]) < _NOISY:
+            return tiles
+        side = 2 * side
+
+
+def _of_size(
+    frames: Sequence[npt.NDArray[Any]],
+    motions: Sequence[Motion],
+    levels: Levels,
+    circle: Circle | None,
+    lens: Lens | None,
+    side: int,
+) -> Tiles:
+    height, width = frames[0].shape[:2]
     spacing = max(side, int(np.sqrt(width * height / _CANDIDATES)))
     x, y = np.meshgrid(
         np.arange(side / 2, width - side / 2 + 0.5, spacing),
@@ -102,20 +125,23 @@ def _look(
     corner = np.clip(corner, 0, [width - side, height - side])
     step = np.arange(side)
     taken = frame[corner[:, 1, None, None] + step[:, None], corner[:, 0, None, None] + step]
-    pixels = np.nan_to_num(taken.reshape(len(points), side * side, 3).astype(np.float64), posinf=levels.top)
+    pixels = taken.reshape(len(points), side * side, 3).astype(np.float32)
+    if frame.dtype == np.float32:
+        pixels = np.nan_to_num(pixels, posinf=levels.top)
     clipped = (pixels >= np.asarray(levels.white)).any(axis=(1, 2))
     black = (pixels <= np.asarray(levels.black)).mean(axis=1) > 0.02
-    pixels /= levels.top
+    pixels *= np.float32(1 / levels.top)
     mean = pixels.mean(axis=1)
+    pixels -= mean[:, None]
     ramp = np.arange(side) - (side - 1) / 2
     across = np.tile(ramp, side) / (side * (ramp**2).sum())
     down = np.repeat(ramp, side) / (side * (ramp**2).sum())
-    right, below = np.einsum("p,tpc->tc", across, pixels), np.einsum("p,tpc->tc", down, pixels)
+    right, below = (np.tensordot(pixels, ramps, axes=(1, 0)) for ramps in (across, down))
     plane = (right**2 + below**2) * side * (ramp**2).sum()
-    rest = ((pixels - mean[:, None]) ** 2).sum(axis=1) - plane
+    rest = np.einsum("tpc,tpc->tc", pixels, pixels) - plane
     variance = np.maximum(rest, 0.0) / max(side * side - 3, 1)
     fair = known[:, None] & ~clipped[:, None] & ~black
-    return mean, variance, np.hypot(right, below), fair
+    return mean.astype(np.float64), variance.astype(np.float64), np.hypot(right, below), fair
 
 
 def choose(tiles: Tiles) -> npt.NDArray[np.int64]:

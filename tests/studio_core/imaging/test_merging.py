@@ -99,13 +99,17 @@ def test_better_than_hat_weights_and_than_opencv() -> None:
     where = ~made.clipped
     frames = [s.pixels for s in one.shots]
     times = np.exp2(np.array(one.listed)).astype(np.float32)
-    curve = cv2.createCalibrateDebevec(samples=200).process(frames, times)
+    curve = cv2.createCalibrateDebevec(samples=200, lambda_=100).process(frames, times)
+    # in the middle both curves are the same; OpenCV's is as rough as single pixels are
+    theirs = np.log2(curve[:, 0, :].T / curve[128, 0, :, None])
+    middle = slice(40, 225)
+    assert np.median(np.abs(theirs - response.curve)[:, middle]) < 0.1
     other = cv2.createMergeDebevec().process(frames, times, curve)
     hat = replace(made, light=hat_merged(frames, one.listed, response))
-    ours, hats, theirs = (stops(m, light, where) for m in (made, hat, replace(made, light=other)))
+    ours, hats, others = (stops(m, light, where) for m in (made, hat, replace(made, light=other)))
     assert np.median(ours) < 0.95 * np.median(hats)
     assert np.quantile(ours, 0.95) < 0.8 * np.quantile(hats, 0.95)
-    assert np.median(ours) < 0.7 * np.median(theirs)
+    assert np.median(ours) < 0.7 * np.median(others)
 
 
 @settings(max_examples=15, deadline=None)
