@@ -197,6 +197,13 @@ def test_where_there_is_no_circle_it_is_not_confident() -> None:
         assert found.circle.radius > 0
 
 
+def test_a_lens_that_fills_the_picture_is_taken_to_reach_its_corners() -> None:
+    everywhere = photograph(light_of([Circle(200, 165, 600)], SIZE, 2), -1)
+    (found,) = find_circles([everywhere], 1)
+    assert found.confidence == 0
+    assert found.circle == Circle(200, 165, math.hypot(200, 165))
+
+
 def test_real_fisheyes(shared_data: Path) -> None:
     """A luminance camera's fills its square picture; a photograph's fades out beyond it, with flare."""
     import cv2
