@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections.abc import Mapping
 
 from studio_core.capturing.artifacts import Bracket, Brackets, FoundCircle
 from studio_core.capturing.settings import BACK, DUAL, EQUIRECTANGULAR, FRONT
@@ -17,6 +18,11 @@ _AROUND = 0.06
 """Kept around a circle that is cut out, of its radius."""
 _NONE = 0.1
 """Confidence below which there is no circle: the lens fills the picture, and is at home in its corners."""
+_UNLIKE = 0.04
+"""Of the radius: one lens on one phone has its circle in nearly the same place in both shots."""
+_SURER = 0.15
+_LENT = 0.45
+"""Confidence in a circle that was taken from the other side, at most: it should be looked at."""
 
 
 def cut_out(brackets: Brackets, job: Job) -> tuple[dict[str, Bracket], dict[str, FoundCircle]]:
@@ -33,7 +39,19 @@ def cut_out(brackets: Brackets, job: Job) -> tuple[dict[str, Bracket], dict[str,
         part = StageJob(job, place / len(brackets.sides), 1 / len(brackets.sides))
         one = find_circles([shot.pixels for shot in bracket.shots], 1, part)[0]
         found[side] = one if one.confidence >= _NONE else _whole(bracket)
-    return dict(brackets.sides), found
+    return dict(brackets.sides), _alike(found, brackets.sides)
+
+
+def _alike(found: dict[str, FoundCircle], sides: Mapping[str, Bracket]) -> dict[str, FoundCircle]:
+    """A circle that is unlike the other side's and less sure takes the other's place: it is the same lens."""
+    if set(found) != {FRONT, BACK} or sides[FRONT].shots[0].size != sides[BACK].shots[0].size:
+        return found
+    less, more = sorted((FRONT, BACK), key=lambda side: found[side].confidence)
+    one, other = found[less], found[more]
+    off = max(abs(getattr(one.circle, a) - getattr(other.circle, a)) for a in ("x", "y", "radius"))
+    if off < _UNLIKE * other.circle.radius or other.confidence < one.confidence + _SURER:
+        return found
+    return {**found, less: FoundCircle(other.circle, min(other.confidence, _LENT))}
 
 
 def _whole(bracket: Bracket) -> FoundCircle:
