@@ -15,7 +15,7 @@ from studio_core.capturing.settings import DUAL, CaptureSettings, LensSettings, 
 from studio_core.shading.job import Job
 from studio_ui.capture.desk import SECTIONS, _after, merged, reached
 from studio_ui.capture.steps.photographs import with_shot
-from studio_ui.capture.telling import STEPS, Line, report_lines, tell_all
+from studio_ui.capture.telling import STEPS, Line, percent, report_lines, span, tell_all
 
 
 def whole() -> CaptureState:
@@ -76,6 +76,36 @@ def test_pictures_of_all_around_have_no_lens_to_tell_of() -> None:
     fresh = reached(state)
     told = tell_all(state, CaptureSettings(), fresh, busy=False)
     assert {"working", "error", "waiting"}.isdisjoint(marks(told))
+
+
+def test_shares_in_percent() -> None:
+    assert [percent(share) for share in (0.0, 0.00037, 0.058, 0.43, 0.999, 1.0, 2.1)] == [
+        "0 %",
+        "0.037 %",
+        "5.8 %",
+        "43 %",
+        "100 %",
+        "100 %",
+        "210 %",
+    ]
+
+
+def test_one_lens_stands_to_no_other() -> None:
+    state = whole()
+    lost = replace(state.registration, trusted=False)
+    both = tell_all(replace(state, registration=lost), CaptureSettings(), reached(state), busy=False)
+    assert any("back to back" in text for text in both["lens"].warnings)
+    one = replace(state, registration=lost, circles=frozen_map({"front": state.circles["front"]}))
+    assert tell_all(one, CaptureSettings(), reached(state), busy=False)["lens"].warnings == ()
+
+
+def test_noise_is_no_light() -> None:
+    light = whole().lights["front"]
+    made = np.full(light.light.shape, 1.0, np.float32)
+    made[:20], made[20:30] = 1 / 16, 1e-6
+    noise = np.zeros(light.noise.shape, np.float32)
+    noise[20:30] = 1
+    assert span(replace(light, light=made, noise=noise)) == 4.0
 
 
 @given(st.sets(st.sampled_from(SECTIONS)))

@@ -14,6 +14,7 @@ from studio_core.capturing.artifacts import CaptureState, LensLight
 from studio_core.capturing.settings import DUAL, NOT_CALIBRATED, CaptureSettings
 
 MarkOf = Literal["done", "warning", "error", "working", "waiting"]
+_SURE = 0.25  # relative noise of light that is resolved
 _MOST = 6  # numbers that a line of the report tells
 
 
@@ -124,7 +125,7 @@ def _light(state: CaptureState, settings: CaptureSettings) -> Told:
     line = f"{max(stops):.0f} stops of light"
     if state.response is not None and not state.response.measured:
         line += ", response assumed"
-    line += f", {_percent(share)} clipped in every exposure" if share > 0 else ", nothing clipped"
+    line += f", {percent(share)} clipped in every exposure" if share > 0 else ", nothing clipped"
     return _said(line, warnings)
 
 
@@ -161,8 +162,8 @@ def exposure_warnings(side: str, light: LensLight) -> list[str]:
 def span(light: LensLight) -> float:
     """Stops between the darkest and the brightest light of a lens that is resolved."""
     skip = max(1, int((light.light.shape[0] * light.light.shape[1] / 100_000) ** 0.5))
-    pixels = light.light[::skip, ::skip].max(axis=-1)
-    lit = pixels[(pixels > 0) & ~light.dark[::skip, ::skip]]
+    pixels, noise = light.light[::skip, ::skip].max(axis=-1), light.noise[::skip, ::skip]
+    lit = pixels[(pixels > 0) & ~light.dark[::skip, ::skip] & (noise < _SURE)]
     if not lit.size:
         return 0.0
     low, high = np.percentile(lit, (0.5, 99.99))
@@ -181,7 +182,7 @@ def _lens(state: CaptureState, settings: CaptureSettings) -> Told:
     line = f"{registration.lens.model}, {registration.lens.fov:.1f}°"
     if registration.matches:
         line += f", {registration.spread:.2f}° between the lenses"
-    if not registration.trusted and not registration.notes:
+    if len(state.circles) > 1 and not registration.trusted and not registration.notes:
         warnings.append("How the lenses stand to each other could not be found: they are taken back to back.")
     return _said(line, [*warnings, *registration.notes])
 
@@ -201,7 +202,7 @@ def _join(state: CaptureState, settings: CaptureSettings) -> Told:
         return Told("waiting")
     height, width = state.stitched.light.shape[:2]
     unseen = _once(state.stitched.unseen, _share)
-    line = f"{width} × {height}" + (f", {_percent(unseen)} never seen" if unseen > 0 else "")
+    line = f"{width} × {height}" + (f", {percent(unseen)} never seen" if unseen > 0 else "")
     if state.stitched.levelled is not None:
         line += f", levelled by {state.stitched.levelled:.1f}°"
     return _said(line, state.stitched.notes if state.stitched.levelled is None else ())
@@ -214,9 +215,9 @@ def _calibration(state: CaptureState, settings: CaptureSettings) -> Told:
     if found.luminance_scale is None:
         line = NOT_CALIBRATED.capitalize()
     else:
-        line = f"{found.luminance_scale:.4g} cd/m² for 1, ± {_percent(found.scale_uncertainty)}"
+        line = f"{found.luminance_scale:.4g} cd/m² for 1, ± {percent(found.scale_uncertainty)}"
     if found.sun != 1:
-        line += f"; clipped light × {found.sun:.3g} ± {_percent(found.sun_uncertainty)}"
+        line += f"; clipped light × {found.sun:.3g} ± {percent(found.sun_uncertainty)}"
     return _said(line, found.notes)
 
 
@@ -228,8 +229,9 @@ def _result(state: CaptureState, settings: CaptureSettings) -> Told:
     return Told("done", line)
 
 
-def _percent(share: float) -> str:
-    return f"{100 * share:.2g} %"
+def percent(share: float) -> str:
+    """Of a share; two digits, more where they stand before the point."""
+    return f"{100 * share:.0f} %" if share >= 0.995 else f"{100 * share:.2g} %"
 
 
 _LINES: Mapping[str, Callable[[CaptureState, CaptureSettings], Told]] = {

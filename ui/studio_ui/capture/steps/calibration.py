@@ -15,6 +15,7 @@ from studio_core.imaging.latlong import direction_to_uv, equirect_direction
 from studio_ui.capture.desk import CaptureDesk
 from studio_ui.capture.preview.picture import Mark, Shown
 from studio_ui.capture.steps.step import CLIPPED, DARK_COLOUR, UNSEEN, StepForm
+from studio_ui.capture.telling import percent
 from studio_ui.capture.tools.place_tool import Pin, Place, PlaceTool
 from studio_ui.context import Context
 from studio_ui.forms.fields import Combo
@@ -116,10 +117,10 @@ class CalibrationStep(StepForm):
             f"White: red × {found.white[0]:.3f}, green × {found.white[1]:.3f}, blue × {found.white[2]:.3f}."
         ]
         if found.luminance_scale is not None:
-            lines.append(f"One is {found.luminance_scale:.4g} cd/m² ± {100 * found.scale_uncertainty:.2g} %.")
+            lines.append(f"One is {found.luminance_scale:.4g} cd/m² ± {percent(found.scale_uncertainty)}.")
         if found.sun != 1:
             lines.append(
-                f"Clipped light was raised {found.sun:.3g} times ± {100 * found.sun_uncertainty:.2g} %."
+                f"Clipped light was raised {found.sun:.3g} times ± {percent(found.sun_uncertainty)}."
             )
         self.told.setText(" ".join([*lines, *found.notes]))
 
