@@ -8,7 +8,7 @@ shows, gives the factor k by which C was too dark: E = s · (E_rest + k · E_C).
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -28,6 +28,7 @@ from studio_core.colour import kelvin
 from studio_core.imaging.cubemap import faces_from_equirect
 from studio_core.imaging.latlong import equirect_direction, pixel_solid_angles
 from studio_core.scene.geometry import Image
+from studio_plugins.capture.clipped import lacking, places
 
 METER = 0.05
 """Relative standard deviation of a light meter's reading (a good one: class B of DIN 5032-7 allows 10 %)."""
@@ -42,11 +43,13 @@ _PARTS = 256  # rows summed at once
 class Readings:
     """What a picture says a meter would read, in its own units of luminance × steradian.
 
-    `rest`: without clipped pixels, `clipped`: of these alone, `edge`: of the outermost of them.
+    `rest`: without clipped pixels, `clipped`: of these alone, `edge`: of the outermost of them, `lack`: of
+    clipped light times the weights of what each place lacks.
     """
 
     rest: float
     clipped: float
+    lack: float
     edge: float
     unseen: float
 
@@ -69,9 +72,8 @@ def calibrate(stitched: Stitched, settings: CalibrationSettings) -> tuple[F32, C
     if settings.sun:
         found = _recovered(stitched, light, settings, scale, uncertainty, notes)
         if found is not None:
-            (scale, uncertainty), (sun, sun_uncertainty) = found
-            light = light.copy() if light is stitched.light else light
-            light[stitched.clipped] *= np.float32(sun)
+            (scale, uncertainty), (sun, sun_uncertainty), raised = found
+            light = light * raised[..., None]
     made = Calibration(white, scale, uncertainty, sun, sun_uncertainty, tuple(notes))
     return light, made
 
@@ -96,18 +98,25 @@ def illuminance(light: F32, facing: tuple[float, float, float]) -> float:
     return _sums(light, facing, {})[0]
 
 
-def _readings(stitched: Stitched, light: F32, facing: tuple[float, float, float]) -> Readings:
+def _readings(
+    stitched: Stitched, light: F32, facing: tuple[float, float, float], lack: F32 | None = None
+) -> Readings:
     import cv2
 
     inner = cv2.erode(stitched.clipped.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
-    masks = {"clipped": stitched.clipped, "edge": stitched.clipped & ~inner, "unseen": stitched.unseen}
+    edge = stitched.clipped & ~inner
+    masks: dict[str, Mask | F32] = {"clipped": stitched.clipped, "edge": edge, "unseen": stitched.unseen}
+    if lack is not None:
+        masks["lack"] = lack
     total, parts = _sums(light, facing, masks)
-    return Readings(total - parts["clipped"], parts["clipped"], parts["edge"], parts["unseen"])
+    clipped = parts["clipped"]
+    return Readings(total - clipped, clipped, parts.get("lack", clipped), parts["edge"], parts["unseen"])
 
 
 def _sums(
-    light: F32, facing: tuple[float, float, float], masks: dict[str, Mask]
+    light: F32, facing: tuple[float, float, float], masks: Mapping[str, Mask | F32]
 ) -> tuple[float, dict[str, float]]:
+    """Of all of a picture, and of its pixels times each mask."""
     height, width = light.shape[:2]
     normal = np.asarray(facing, np.float64)
     length = float(np.linalg.norm(normal))
@@ -122,7 +131,7 @@ def _sums(
         caught = (light[rows] @ np.asarray(WEIGHTS, np.float32)) * cosine
         total += float(caught.sum())
         for name, mask in masks.items():
-            parts[name] += float(caught[mask[rows]].sum())
+            parts[name] += float((caught * mask[rows]).sum())
     return total, parts
 
 
@@ -199,7 +208,7 @@ def _scale(
         if not (grey > 0 and settings.luminance > 0):
             notes.append("The place of known luminance was not used: there is no light.")
             return None, 0.0
-        return settings.luminance / grey, math.hypot(METER, place.uncertainty)
+        return float(settings.luminance) / grey, math.hypot(METER, place.uncertainty)
     assert settings.scale == LUX
     seen = _readings(stitched, light, settings.facing)
     used = seen.rest if _shaded(settings) else seen.all
@@ -215,7 +224,7 @@ def _scale(
     unseen = seen.unseen / seen.all
     if unseen > 0.02:
         notes.append(f"{unseen:.0%} of the light at the meter is a guess, where no lens looked.")
-    return settings.lux / used, math.hypot(math.hypot(METER, PICTURE), math.hypot(lost, unseen / 2))
+    return float(settings.lux) / used, math.hypot(math.hypot(METER, PICTURE), math.hypot(lost, unseen / 2))
 
 
 def _shaded(settings: CalibrationSettings) -> bool:
@@ -230,8 +239,9 @@ def _recovered(
     scale: float | None,
     uncertainty: float,
     notes: list[str],
-) -> tuple[tuple[float, float], tuple[float, float]] | None:
-    """(scale, its relative uncertainty), (factor, its standard deviation), or None with a note why."""
+) -> tuple[tuple[float, float], tuple[float, float], F32] | None:
+    """(scale, its relative uncertainty), (mean factor of clipped light, its standard deviation), the factor
+    of every pixel (H, 2H); or None with a note why."""
 
     def refuse(why: str) -> None:
         notes.append(f"The clipped lamp was left as it is: {why}.")
@@ -243,11 +253,14 @@ def _recovered(
         refuse("a second measurement is needed for the scale, of the room without it or of a place")
         return None
     facing = settings.facing if settings.sun_facing is None else settings.sun_facing
-    here = _readings(stitched, light, facing)
+    labels, count = places(stitched.clipped)
+    weights = lacking(light @ np.asarray(WEIGHTS, np.float32), labels, count)
+    lack = weights.astype(np.float32)[labels]
+    here = _readings(stitched, light, facing, lack)
     if here.clipped <= 1e-6 * here.rest:
         refuse("it does not shine on the meter where that faced")
         return None
-    first = _readings(stitched, light, settings.facing)
+    first = _readings(stitched, light, settings.facing, lack)
     solve = _solver(settings, scale)
     # relative standard deviations: both readings, rest and clipped light of the picture at both
     rims = here.edge / here.clipped / math.sqrt(12)  # rim pixels may be covered anywhere from 0 to 1
@@ -275,45 +288,44 @@ def _recovered(
     if factor - 1 < _SURE * gap:
         refuse(f"what is lacking ({factor - 1:.2g} times its light) is within the uncertainty of ± {gap:.2g}")
         return None
-    pieces = _pieces(stitched.clipped)
-    if pieces > 1:
-        notes.append(f"{pieces} separate clipped places were raised by the same factor.")
-    return (unit, math.sqrt(scale_variance)), (factor, spread)
+    raised = 1 + (factor - 1) * here.clipped / here.lack * lack
+    if count > 1:
+        each = 1 + (factor - 1) * here.clipped / here.lack * weights[1:]
+        notes.append(
+            f"{count} separate clipped places were raised {each.min():.2g} to {each.max():.2g} times,"
+            " by how far each outshines its rim: one reading does not tell them apart."
+        )
+    return (unit, math.sqrt(scale_variance)), (factor, spread), np.asarray(raised, np.float32)
 
 
 _Solve = Callable[[Readings, Readings, dict[str, float]], tuple[float, float] | None]
 
 
 def _solver(settings: CalibrationSettings, scale: float) -> _Solve:
-    """Factor of the clipped light and scale, from the readings at both facings and relative errors."""
+    """Mean factor of clipped light at the second reading, and scale, from both readings and relative errors.
+
+    Clipped light is C + t D, D what its places may lack: t follows from the readings, 1 + t D / C is told.
+    """
 
     def solve(first: Readings, here: Readings, off: dict[str, float]) -> tuple[float, float] | None:
-        second = settings.sun_lux * off["second"]
-        rest, clip = here.rest * off["rest"], here.clipped * off["clip"]
+        second = float(settings.sun_lux) * off["second"]
+        rest, clip, lack = here.rest * off["rest"], here.clipped * off["clip"], here.lack * off["clip"]
         if settings.scale == LUX and settings.sun_facing is not None:  # the lamp may count in both
-            one_rest, one_clip = first.rest * off["rest"], first.clipped * off["clip"]
+            one_all = first.rest * off["rest"] + first.clipped * off["clip"]
+            one_lack = first.lack * off["clip"]
             ratio = second / (settings.lux * off["first"])
-            below = clip - ratio * one_clip
-            if below <= 1e-3 * clip:
+            below = lack - ratio * one_lack
+            if below <= 1e-3 * lack:
                 return None
-            factor = (ratio * one_rest - rest) / below
-            total = one_rest + factor * one_clip
-            return (factor, settings.lux * off["first"] / total) if total > 0 else None
+            more = (ratio * one_all - rest - clip) / below
+            total = one_all + more * one_lack
+            return (1 + more * lack / clip, settings.lux * off["first"] / total) if total > 0 else None
         unit = scale * off["first"]
         if settings.scale == LUX:  # scale was lux / rest
             unit /= off["rest"]
         return (second / unit - rest) / clip, unit
 
     return solve
-
-
-def _pieces(mask: Mask) -> int:
-    """Separate clipped places; left and right edge of the picture are neighbours."""
-    import cv2
-
-    count, labels = cv2.connectedComponents(mask.astype(np.uint8), connectivity=8)
-    joined = {(a, b) for a, b in zip(labels[:, 0], labels[:, -1], strict=True) if a and b and a != b}
-    return int(count) - 1 - len(joined)
 
 
 __all__ = ["METER", "PICTURE", "Readings", "calibrate", "finished", "illuminance"]

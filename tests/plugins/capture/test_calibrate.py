@@ -22,6 +22,7 @@ from studio_core.capturing.settings import (
 from studio_core.colour import kelvin
 from studio_core.imaging.latlong import direction_to_uv, equirect_direction, pixel_solid_angles
 from studio_plugins.capture.calibrate import METER, calibrate, finished, illuminance
+from studio_plugins.capture.clipped import lacking, places
 
 WEIGHTS = np.array([0.2126, 0.7152, 0.0722])
 UP = (0.0, 1.0, 0.0)
@@ -256,6 +257,46 @@ def test_two_lamps_across_the_picture_s_edge_are_two() -> None:
     _, made = calibrate(stitched(captured, clipped=lamps), chosen)
     assert made.sun > 50
     assert "2 separate" in made.notes[-1]
+
+
+def test_a_strong_lamp_lacks_more_than_a_bright_curtain() -> None:
+    """Both are clipped at 100; the curtain rises gently to twice that, the lamp is thirty times as bright."""
+    directions = sphere(128)
+    angle = np.degrees(np.arccos(np.clip(directions @ np.array([0.6, 0.8, 0.0]), -1, 1)))
+    true = np.full((128, 256, 3), 5.0, np.float32)
+    true += (195 * np.exp(-((angle / 14) ** 2)))[..., None].astype(np.float32)
+    lamp = disc(128, (-0.6, 0.8, 0.0), 4.0)
+    true[lamp] = 3000
+    captured = np.minimum(true, 100)
+    clipped = true[..., 1] > 100
+    shaded = meter(true * ~clipped[..., None], UP)
+    chosen = CalibrationSettings(scale=LUX, lux=shaded, facing=UP, sun=True, sun_lux=meter(true, UP))
+    light, made = calibrate(stitched(captured, clipped=clipped), chosen)
+    assert made.luminance_scale is not None
+    scale = made.luminance_scale
+    assert scale * meter(light, UP) == pytest.approx(meter(true, UP), rel=1e-3)
+    curtain = clipped & ~lamp
+    errors = [abs(np.log2(scale * light[m].mean() / true[m].mean())) for m in (lamp, curtain)]
+    same = scale * made.sun * captured
+    assert max(errors) < 0.75 * max(abs(np.log2(same[m].mean() / true[m].mean())) for m in (lamp, curtain))
+    assert errors[0] < 1
+    assert made.sun == pytest.approx((true[clipped].sum()) / captured[clipped].sum(), rel=0.3)
+
+
+def test_places_are_numbered_around_the_picture_s_edge() -> None:
+    mask = np.zeros((8, 16), np.bool_)
+    mask[2, 0] = mask[2, 15] = mask[3, 15] = mask[5, 4:7] = mask[7, 9] = True
+    labels, count = places(mask)
+    assert count == 3
+    assert labels[2, 0] == labels[3, 15] > 0
+    assert len({labels[2, 0], labels[5, 5], labels[7, 9]}) == 3
+    assert ((labels > 0) == mask).all()
+    weights = lacking(np.where(mask, 10.0, 1.0), labels, count)
+    assert weights[0] == 0
+    assert weights.max() == 1
+    assert (weights[1:] > 0).all()
+    assert weights[labels[7, 9]] < weights[labels[5, 5]]  # of one contrast the larger one lacks more
+    assert places(~mask & mask)[1] == 0
 
 
 def test_the_end_of_a_capture_has_all_its_parts() -> None:
