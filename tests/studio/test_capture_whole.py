@@ -17,6 +17,7 @@ from studio.bench.phone_files import as_dual, write_photograph, write_shots
 from studio.bench.phone_optics import HALF_TURN
 from studio.bench.phone_response import Curve
 from studio.cli import BAD_INPUT, main
+from studio_core.imaging.encode import write_exr
 from studio_core.imaging.environment import load_environment
 from studio_core.imaging.photograph import Photograph, ShotFacts
 from studio_core.imaging.projection import Circle
@@ -76,7 +77,7 @@ def _capture(
     """The environment and what was told; everything is finite."""
     out = tmp_path / "room.exr"
     capsys.readouterr()
-    status = main(["capture", *arguments, "-o", str(out), "--set", "stitch.width=256", "--json", "--quiet"])
+    status = main(["capture", "--set", "stitch.width=256", *arguments, "-o", str(out), "--json", "--quiet"])
     said = capsys.readouterr()
     assert status == 0, said.err
     image, _ = load_environment(out)
@@ -150,6 +151,14 @@ def test_an_equirectangular_bracket(tmp_path: Path, capsys: pytest.CaptureFixtur
         write_photograph(shot, Path(files[-1]))
     made, _ = _capture(tmp_path, capsys, "--equirect", *files, "--set", "stitch.level=no")
     assert irradiance_error(made, _room(), np.eye(3)) < 0.03
+
+
+def test_an_environment_stays_what_it_is(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    room = _room(64) * np.geomspace(1e-3, 1e3, 128, dtype=np.float32)[None, :, None]
+    write_exr(tmp_path / "all.exr", room)
+    given = ["--equirect", str(tmp_path / "all.exr"), "--set", "stitch.level=no", "--set", "stitch.width=128"]
+    made, _ = _capture(tmp_path, capsys, *given)
+    np.testing.assert_allclose(made / made.mean(), room / room.mean(), rtol=1e-4)
 
 
 def test_odd_brackets_give_a_result_and_say_what_was_wrong(

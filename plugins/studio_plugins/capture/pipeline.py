@@ -341,10 +341,10 @@ def _merged(
 
 def _view(light: LensLight, found: FoundCircle | None, lens: Lens) -> View:
     height, width = light.light.shape[:2]
-    if found is None:  # a picture of all around
+    if found is None:  # a picture of all around: what is dark is marked so, and stays as dark as it is
         return View(
             light.light,
-            ~light.dark,
+            np.ones((height, width), np.bool_),
             Circle(width / 2, height / 2, height / 2),
             lens,
             light.clipped,
