@@ -28,7 +28,7 @@ class Shown:
     """One picture of the preview, as the very array that the stages made.
 
     `key`: pictures of one key and size keep their zoom. `before`: same size, for the wipe. `say(x, y)`: what
-    else there is to tell of a point of the picture. `around`: equirectangular.
+    else there is to tell of a point of the picture.
     """
 
     key: str
@@ -37,7 +37,6 @@ class Shown:
     marks: tuple[Mark, ...] = ()
     before: npt.NDArray[Any] | None = None
     say: Callable[[float, float], str] = lambda x, y: ""
-    around: bool = False
 
     @property
     def size(self) -> tuple[int, int]:

@@ -61,6 +61,5 @@ def halved(pixels: npt.NDArray[Any]) -> npt.NDArray[Any]:
     for corner in corners[1:]:
         total += corner
     if wide is np.float32:
-        total *= np.float32(0.25)
-        return total
+        return np.asarray(total * np.float32(0.25), np.float32)
     return ((total + 2) >> 2).astype(pixels.dtype)

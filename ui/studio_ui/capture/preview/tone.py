@@ -48,7 +48,7 @@ def natural_exposure(pixels: npt.NDArray[Any]) -> float:
         return 0.0
     lit = lit[lit >= np.percentile(lit, 99) * _FRAME]
     found = np.log2(_MIDDLE) - float(np.log2(lit).mean())
-    return round(3 * found) / 3
+    return float(round(3 * found)) / 3
 
 
 def tinted(mask: npt.NDArray[np.bool_], colour: Rgb, opacity: float = 0.6) -> npt.NDArray[np.uint8]:

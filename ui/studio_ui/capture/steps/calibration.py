@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from functools import partial
 
 import numpy as np
@@ -14,7 +13,7 @@ from studio_core.capturing.settings import GREY_CARD, KELVIN, LUMINANCE, LUX
 from studio_core.imaging.latlong import direction_to_uv, equirect_direction
 from studio_ui.capture.desk import CaptureDesk
 from studio_ui.capture.preview.picture import Mark, Shown
-from studio_ui.capture.steps.step import CLIPPED, DARK_COLOUR, UNSEEN, StepForm
+from studio_ui.capture.steps.step import CLIPPED, DARK_COLOUR, UNSEEN, StepForm, direction_text
 from studio_ui.capture.telling import percent
 from studio_ui.capture.tools.place_tool import Pin, Place, PlaceTool
 from studio_ui.context import Context
@@ -155,7 +154,7 @@ class CalibrationStep(StepForm):
         pixels = captured.environment.pixels
         self.place_tool.size = (pixels.shape[1], pixels.shape[0])
         marks = self.marks((captured,), lambda: unresolved_marks(captured))
-        return Shown("finished", "All around", pixels, marks, around=True, say=direction_text(pixels.shape))
+        return Shown("finished", "All around", pixels, marks, say=direction_text(pixels.shape))
 
     def _place(self, name: str) -> Place:
         settings = self.desk.settings.calibration
@@ -205,17 +204,6 @@ def _labelled(name: str, field: QWidget) -> QWidget:
     made = QWidget()
     form_layout(made).addRow(form_label(name, _FACING_TIP), field)
     return made
-
-
-def direction_text(shape: tuple[int, ...]) -> Callable[[float, float], str]:
-    """Words for a point of an equirectangular picture of that shape: compass and height."""
-    height, width = shape[:2]
-
-    def say(x: float, y: float) -> str:
-        turn, up = 360 * (x / width - 0.5), 90 - 180 * y / height
-        return f"{abs(turn):.1f}° {'right' if turn >= 0 else 'left'}, {up:+.1f}° up"
-
-    return say
 
 
 def unresolved_marks(captured: Captured) -> tuple[Mark, ...]:

@@ -9,7 +9,7 @@ from studio_core.capturing.artifacts import Stitched
 from studio_core.capturing.settings import StitchSettings
 from studio_ui.capture.desk import CaptureDesk
 from studio_ui.capture.preview.picture import Mark, Shown
-from studio_ui.capture.steps.step import CLIPPED, UNSEEN, StepForm
+from studio_ui.capture.steps.step import CLIPPED, UNSEEN, StepForm, direction_text
 from studio_ui.capture.tools.turn_tool import TurnTool
 from studio_ui.capture.turning import F64, angles_of, between, user_turn
 from studio_ui.context import Context
@@ -54,7 +54,11 @@ class JoinStep(StepForm):
             return None
         self.turn_tool.size = (stitched.light.shape[1], stitched.light.shape[0])
         return Shown(
-            "joined", "Joined", stitched.light, self.marks((stitched,), lambda: _marks(stitched)), around=True
+            "joined",
+            "Joined",
+            stitched.light,
+            self.marks((stitched,), lambda: _marks(stitched)),
+            say=direction_text(stitched.light.shape),
         )
 
     def turned(self) -> F64 | None:

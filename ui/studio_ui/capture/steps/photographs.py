@@ -97,16 +97,16 @@ def rows_of(capture: Capture, settings: CaptureSettings, state: CaptureState) ->
             )
     for digest, photograph in kept.items():
         made.setdefault(digest, Row(photograph, listed=photograph.facts.ev))
-    for digest, shot in decided.items():
+    for digest, said in decided.items():
         if digest in made:
             found = made[digest]
             made[digest] = replace(
                 found,
-                side=shot.side or found.side,
-                listed=found.listed if shot.ev is None else shot.ev,
-                typed=shot.ev is not None,
-                certain=found.certain or shot.ev is not None,
-                used=shot.used,
+                side=said.side or found.side,
+                listed=found.listed if said.ev is None else said.ev,
+                typed=said.ev is not None,
+                certain=found.certain or said.ev is not None,
+                used=said.used,
             )
     return list(made.values())
 

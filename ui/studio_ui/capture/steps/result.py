@@ -15,8 +15,8 @@ from studio_core.shading.job import Job
 from studio_ui.ask import Ask, Filter
 from studio_ui.capture.desk import CaptureDesk
 from studio_ui.capture.preview.picture import Shown
-from studio_ui.capture.steps.calibration import direction_text, unresolved_marks
-from studio_ui.capture.steps.step import StepForm
+from studio_ui.capture.steps.calibration import unresolved_marks
+from studio_ui.capture.steps.step import StepForm, direction_text
 from studio_ui.capture.telling import Line, report_lines
 from studio_ui.context import Context
 from studio_ui.panels.panel import heading, note, row
@@ -105,7 +105,7 @@ class ResultStep(StepForm):
             return Shown("cube", f"Cube of {captured.faces.shape[1]}", self._cross)
         pixels = captured.environment.pixels
         marks = self.marks((captured,), lambda: unresolved_marks(captured))
-        return Shown("finished", AROUND, pixels, marks, say=direction_text(pixels.shape), around=True)
+        return Shown("finished", AROUND, pixels, marks, say=direction_text(pixels.shape))
 
     def light(self) -> None:
         """Light the scene with it."""

@@ -163,3 +163,14 @@ def angles(desk: CaptureDesk, side: str) -> Callable[[float, float], str]:
 def named(sides: Mapping[str, Any]) -> list[str]:
     """Sides as they are chosen: Front, Back."""
     return [side.capitalize() for side in sides]
+
+
+def direction_text(shape: tuple[int, ...]) -> Callable[[float, float], str]:
+    """Words for a point of an equirectangular picture of that shape: compass and height."""
+    height, width = shape[:2]
+
+    def say(x: float, y: float) -> str:
+        turn, up = 360 * (x / width - 0.5), 90 - 180 * y / height
+        return f"{abs(turn):.1f}° {'right' if turn >= 0 else 'left'}, {up:+.1f}° up"
+
+    return say
