@@ -230,8 +230,12 @@ def _filled(own: View, area: _Area, source: _Source) -> F32:
     level_there = there.reshape(-1, 3)[: len(azimuth)]
     known = source.known_pixels
     at = area.pixels[known]
+    if not len(at):
+        return made
     # a frame only adds light: what comes out brighter is a lamp that near things' shift has brought there
-    most = cv2.dilate(own.light, np.ones((5, 5), np.uint8))[at[:, 0], at[:, 1]] * np.float32(_BRIGHTER)
+    (top, left), (bottom, right) = np.maximum(at.min(axis=0) - 2, 0), at.max(axis=0) + 3
+    most = cv2.dilate(own.light[top:bottom, left:right], np.ones((5, 5), np.uint8))
+    most = most[at[:, 0] - top, at[:, 1] - left] * np.float32(_BRIGHTER)
     made[at[:, 0], at[:, 1]] = np.minimum(np.exp(source.pixels + level_there)[known], most)
     return made
 
@@ -324,7 +328,8 @@ def _from_ring(own: View, area: _Area, patch: Patch) -> _Source:
 
 
 def _floor(view: View) -> float:
-    light = view.light[view.usable]
+    every = np.s_[:: max(1, view.light.shape[0] // 512), :: max(1, view.light.shape[1] // 512)]
+    light = view.light[every][view.usable[every]]
     return max(_FLOOR * float(np.median(light)), 1e-30) if light.size else 1e-30
 
 
