@@ -25,7 +25,8 @@ from studio_plugins.capture.ring import angles, coarser, directions
 
 _FLOOR = 1e-4  # of the median light
 _ODD = math.log(4.0)  # a border that is further off than this from the others is something else
-_BRIGHTER = 1.1
+_BRIGHTER, _FAR_MORE = 1.1, 4.0
+_LAMP = 4.0  # degrees across, at most
 _PENUMBRA = 1.5  # degrees of a rectangle's inner border that are taken as a source all the same
 _COVERED = 0.4  # of a rectangle that the other lens has to see
 _ACROSS, _ALONG = 0.5, 2.0  # degrees: steps of looking for a clean part of the ring
@@ -232,12 +233,28 @@ def _filled(own: View, area: _Area, source: _Source) -> F32:
     at = area.pixels[known]
     if not len(at):
         return made
-    # a frame only adds light: what comes out brighter is a lamp that near things' shift has brought there
     (top, left), (bottom, right) = np.maximum(at.min(axis=0) - 2, 0), at.max(axis=0) + 3
-    most = cv2.dilate(own.light[top:bottom, left:right], np.ones((5, 5), np.uint8))
-    most = most[at[:, 0] - top, at[:, 1] - left] * np.float32(_BRIGHTER)
-    made[at[:, 0], at[:, 1]] = np.minimum(np.exp(source.pixels + level_there)[known], most)
+    around, y, x = own.light[top:bottom, left:right], at[:, 0] - top, at[:, 1] - left
+    lamp = int(math.radians(_LAMP) * own.circle.radius / own.lens.half) | 1
+    wide = cv2.morphologyEx(around, cv2.MORPH_OPEN, np.ones((lamp, lamp), np.uint8))
+    most = cv2.dilate(around, np.ones((5, 5), np.uint8))[y, x] * np.float32(_BRIGHTER)
+    clone = np.exp(source.pixels + level_there)[known]
+    made[at[:, 0], at[:, 1]] = _thrown_off(around[y, x], clone, most, (around - wide)[y, x])
     return made
+
+
+def _thrown_off(light: F32, clone: F64, most: F32, detail: F32) -> npt.NDArray[Any]:
+    """`clone` (N, 3), as far as a frame can have made `light` of it.
+
+    A frame only adds light: what comes out brighter than `most` is a lamp that the shift of near things has
+    brought in. And it adds calm light: small bright `detail` that is lost, and is far more than what is lost
+    elsewhere, is a lamp that the source does not show.
+    """
+    lost = light - clone
+    even = _FAR_MORE * np.percentile(np.maximum(lost, 0), 75, axis=0)
+    kept = np.minimum(clone, most)
+    lamps = np.maximum(kept, np.minimum(light - even, kept + detail))
+    return np.asarray(np.where(lost > even, lamps, kept))
 
 
 def _from_other(

@@ -154,3 +154,27 @@ def test_patches_that_are_not_used_do_nothing():
     made = remove({FRONT: clean}, None, (patch, replace(OVER, side=BACK)), Job("remove"))
     assert made.lights[FRONT] is clean.light
     assert made.patches[0] == patch
+
+
+@pytest.mark.parametrize("side", [FRONT, BACK])
+def test_lamps_that_one_lens_shows_neither_vanish_nor_come_in(side):
+    """In the rectangle, one of the lenses sees a lamp that the other does not: near things are shifted."""
+    clean, way = smooth_view()
+    azimuth, theta = angles(way)
+    core = covers(replace(OVER, azimuth=50, width=40, inner=92), azimuth, theta)[..., None]
+    towards = np.array([np.cos(1.3) * np.sin(1.64), np.sin(1.3) * np.sin(1.64), -np.cos(1.64)])
+    if side == BACK:
+        towards = towards * [-1, 1, -1]
+    lamp = (way @ towards > np.cos(0.02))[..., None]
+    assert lamp.sum() > 4
+    lights = {FRONT: np.where(core, clean.light * 2, clean.light), BACK: clean.light}
+    lights[side] = np.where(lamp, np.float32(300), lights[side])
+    views = {name: replace(clean, light=light) for name, light in lights.items()}
+    known = Registration(np.diag([-1.0, 1.0, -1.0]), clean.lens, np.ones(3), (0.0, 0.0, 0.0), 0.1, 9, True)
+    made = remove(views, known, (OVER,), Job("remove")).lights[FRONT]
+    mask = inside(clean, OVER)
+    if side == FRONT:
+        assert made[lamp[..., 0] & mask].mean() > 200
+        mask &= ~lamp[..., 0]
+    assert made[mask].max() < 4.5
+    assert stops(made, clean.light, mask).mean() < 0.1
