@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -25,6 +26,7 @@ _ROUGH = 0.006  # what a bin's median may be wrong by beyond its noise, in ln
 _LOSS_SPREAD = 0.35
 _MOST = 0.85
 _FEW = 20
+_ROUNDS = 4
 NO_RIM = (0.0, 1.0, 0.02)
 _STEEPER, _GAIN = 0.6, 30.0  # how much better a steep rim must explain what is seen
 _SHAPE_DOUBT = 0.15  # of what is lost, for what the overlap does not tell
@@ -72,25 +74,39 @@ def balanced(front: Strip, back: Strip, stand: Stand, loss: float | None = None)
         fall = np.log(light(x, here)) - np.log(light(x, there))
         return np.asarray((ratio - fall[:, None] - x[:3]) / noise, np.float64)
 
+    def with_priors(x: F64, some: F64) -> F64:
+        if loss is not None:
+            return some
+        return np.concatenate([some, [x[3] / _LOSS_SPREAD, *((x[4:6] - _SHAPE) / _SHAPE_SPREAD)]])
+
     def terms(x: F64) -> F64:
-        """Robust in the data only: pseudo-Huber by hand, priors as they are."""
+        """Pseudo-Huber."""
         some = left(x).ravel()
         soft = np.sign(some) * np.sqrt(2 * (np.sqrt(1 + (some / 1.5) ** 2) - 1)) * 1.5
-        if loss is not None:
-            return np.asarray(soft, np.float64)
-        return np.concatenate([soft, [x[3] / _LOSS_SPREAD, *((x[4:6] - _SHAPE) / _SHAPE_SPREAD)]])
+        return with_priors(x, np.asarray(soft, np.float64))
+
+    def settled(x: F64, **bounded: Any) -> Any:
+        """From there, pieces that do not fit (reflections of the frame, near things) count less and less."""
+        for _ in range(_ROUNDS):
+            off = np.abs(left(x))
+            scale = max(1.0, 1.48 * float(np.median(off)))
+            weight = 1 / (1 + (off / (2.5 * scale)) ** 2)  # its square: Geman and McClure
+            made = least_squares(lambda x: with_priors(x, (weight * left(x)).ravel()), x, **bounded)  # noqa: B023
+            x = made.x
+        return made
 
     if loss is not None:
-        found = least_squares(terms, first)
+        found = settled(least_squares(terms, first).x)
         return Balance(np.exp(found.x), from_loss(loss), 0.0, _off(left(found.x), noise))
     start = np.array([*first, 0.1, *_SHAPE, 0.1, 0.93, 0.02])
     low = np.array([*(first - 3), 0.0, -0.25, 0.0, 0.0, 0.85, 0.008])
     high = np.array([*(first + 3), _MOST, 0.8, 0.6, 0.9, 1.0, 0.06])
     smooth = least_squares(terms, start[:6], bounds=(low[:6], high[:6]), x_scale=0.1)
     steep = least_squares(terms, start, bounds=(low, high), x_scale=[0.1] * 6 + [0.1, 0.03, 0.02])
-    found = smooth
     if steep.cost < _STEEPER * smooth.cost and smooth.cost - steep.cost > _GAIN:
-        found = steep
+        found = settled(steep.x, bounds=(low, high), x_scale=[0.1] * 6 + [0.1, 0.03, 0.02])
+    else:
+        found = settled(smooth.x, bounds=(low[:6], high[:6]), x_scale=0.1)
     spread = np.linalg.pinv(found.jac.T @ found.jac)
     falloff, rim = _falloff(found.x), _rim(found.x)
     lost = 1 - float(light_at(falloff, rim, 1.0))

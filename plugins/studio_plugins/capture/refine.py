@@ -32,7 +32,10 @@ _APART = 3.0  # degrees between patches
 _NEAR = 0.7  # degrees by which near things may differ between the lenses
 _TREND = 16  # pieces of the overlap from one lens' edge to the other's
 _FEWEST = 6  # patches
-_AGREE = 0.5  # correlation from which a patch counts
+_AGREE, _AGREE_BLURRED = 0.5, 0.3  # correlation from which a patch counts
+_PATCH = 1.6  # degrees, standard deviation of its window
+_MARGIN = math.radians(12)  # by which the overlap may lie elsewhere than expected
+_FEW_PIXELS = 50
 
 
 def refined(front: Strip, back: Strip, stand: Stand, fit_fov: bool, blurs: tuple[float, ...] = BLURS) -> Fit:
@@ -67,87 +70,82 @@ def _beside_near_things(front: Strip, back: Strip, made: Fit, fit_fov: bool, blu
 
 def compared(front: Strip, back: Strip, stand: Stand, blur: float) -> Patches:
     """What a warp by `stand` leaves to shift, patch by patch; `blur` in degrees."""
-    import cv2
-
-    at = front.grid()
-    rows = np.flatnonzero(front.usable.any(axis=1))
-    reach = back.first + back.shape[0] * back.step, back.first
-    t = at[:, 0, 1]
-    margin = math.radians(12)
-    rows = rows[(t[rows] < reach[0] + margin) & (t[rows] > reach[1] - margin)]
-    if not len(rows):
+    laid = _laid_over(front, back, stand, blur)
+    if laid is None:
         return NOTHING
-    part = slice(rows[0], rows[-1] + 1)
-    at = at[part]
-    opposite = across(front, back, at, stand)
-    x, y = back.pixels(opposite)
-    weight = np.asarray(
-        cv2.remap(
-            padded(back.usable.astype(np.float32)), x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT
-        )
-    )
-    other = np.asarray(cv2.remap(padded(back.tone), x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT))
-    both: Mask = front.usable[part] & (weight > 0.99)
-    if both.sum() < 50:
-        return NOTHING
-    sigma = math.radians(blur) / front.step
-    calm_sigma = math.radians(max(_CALM, 2 * blur)) / front.step
-    one = front.tone[part] - _trend(front.tone[part] - other, at[..., 1] + opposite[..., 1], both)
-    one, other = flattened(one, both, calm_sigma), flattened(np.asarray(other, np.float32), both, calm_sigma)
-    one, other, both = _blurred(one, other, both, sigma)
-    patch = max(1.6, 1.2 * blur)  # degrees, standard deviation of a patch
-    slope_x = np.gradient((one + other) / 2, axis=1)
-    slope_y = np.gradient((one + other) / 2, axis=0)
-    calm = both.astype(np.float32)
-    calm = np.asarray(
-        cv2.erode(calm, np.ones((3, 3), np.uint8), borderType=cv2.BORDER_CONSTANT, borderValue=0), np.float32
-    )
-    missing = one - other
-    sums = np.stack(
-        [
-            slope_x * slope_x, slope_x * slope_y, slope_y * slope_y, slope_x * missing, slope_y * missing,
-            missing * missing, one, other, one * one, other * other, one * other, np.ones_like(one),
-        ],
-        axis=-1,
-    )  # fmt: skip
-    sums *= calm[..., None]
-    sums = spread(sums, math.radians(patch) / front.step)
+    one, other, calm, at = laid
     apart = max(1, round(math.radians(_APART) / front.step))
-    middle = slice(apart // 2, None, apart)
-    some = sums[:, middle]
-    share = some[..., 11].sum(axis=0) > 0
-    # rows of patches: as many as fit the overlap at this azimuth
-    picked = np.zeros(some.shape[:2], np.bool_)
-    high = np.maximum(1, apart)
-    for column in np.flatnonzero(share):
-        inside = np.flatnonzero(calm[:, middle][:, column] > 0)
-        if not len(inside):
-            continue
-        first, last = inside[0], inside[-1]
-        number = max(1, round((last - first + 1) / high))
-        centre = first + (np.arange(number) + 0.5) * (last - first + 1) / number
-        picked[np.clip(centre.astype(np.intp), first, last), column] = True
-    here = at[:, middle][picked]
-    xx, xy, yy, bx, by, rest, mean_a, mean_b, aa, bb, ab, count = (some[picked][:, i] for i in range(12))
+    columns = slice(apart // 2, None, apart)
+    sigma = math.radians(max(_PATCH, 1.2 * blur)) / front.step
+    picked = _middles(calm[:, columns] > 0, apart)
+    slope_y, slope_x = np.gradient((one + other) / 2)
+    missing = one - other
+    products = (
+        slope_x * slope_x, slope_x * slope_y, slope_y * slope_y, slope_x * missing, slope_y * missing,
+        missing * missing, one, other, one * one, other * other, one * other, np.ones_like(one),
+    )  # fmt: skip
+    sums = spread(np.stack(products, axis=-1) * calm[..., None], sigma)[:, columns][picked].astype(np.float64)
+    xx, xy, yy, bx, by, rest, mean_a, mean_b, aa, bb, ab, count = sums.T
     count = np.maximum(count, 1e-9)
     mean_a, mean_b = mean_a / count, mean_b / count
     va, vb = aa / count - mean_a**2, bb / count - mean_b**2
     likeness = (ab / count - mean_a * mean_b) / np.sqrt(np.maximum(va * vb, 1e-12))
     texture = np.stack([np.stack([xx, xy], -1), np.stack([xy, yy], -1)], -2)
-    trace = (xx + yy)[:, None, None] * np.eye(2)
-    shift = np.linalg.solve(texture + 1e-3 * trace + 1e-12 * np.eye(2), np.stack([bx, by], -1)[..., None])[
-        ..., 0
-    ]
+    firm = (1e-3 * (xx + yy) + 1e-12)[:, None, None] * np.eye(2)
+    shift = np.linalg.solve(texture + firm, np.stack([bx, by], -1)[..., None])[..., 0]
     unexplained = np.maximum(rest - shift[:, 0] * bx - shift[:, 1] * by, 1e-4 * aa) / count
-    pixels = 2 * math.pi * sigma**2 + 1  # correlated by the blur
-    surety = texture / (unexplained * pixels)[:, None, None] / front.step**2
-    limit = max(1.5 * blur, 0.5)  # degrees
-    fits = np.hypot(*shift.T) * front.step < math.radians(limit)
+    # a patch says as much as one pixel: it is often one edge, and more trust measured worse
+    alike = 2 * math.pi * (math.radians(blur) / front.step) ** 2 + 1  # pixels, by the blur
+    surety = texture / (unexplained * alike)[:, None, None] / front.step**2
     textured = (va > 1e-5) & (vb > 1e-5) & (count > 0.15 * count.max(initial=0.0))
-    keep = (likeness > (_AGREE if blur < 1 else 0.3)) & fits & textured
+    fits = np.hypot(*shift.T) * front.step < math.radians(max(1.5 * blur, 0.5))
+    keep = (likeness > (_AGREE if blur < 1 else _AGREE_BLURRED)) & fits & textured
     contrast = np.where(textured, np.maximum(va * vb, 0) ** 0.25, 0)
-    here, there = here[keep], across(front, back, here[keep] + shift[keep] * front.step, stand)
-    return Patches(here, there, surety[keep], likeness[keep], contrast[keep], float(contrast.sum()))
+    places = at[:, columns][picked][keep]
+    there = across(front, back, places + shift[keep] * front.step, stand)
+    return Patches(places, there, surety[keep], likeness[keep], contrast[keep], float(contrast.sum()))
+
+
+def _laid_over(front: Strip, back: Strip, stand: Stand, blur: float) -> tuple[F32, F32, F32, F64] | None:
+    """Both strips' tones at places (rows, columns, 2), levelled and blurred, and 1 where both are known."""
+    import cv2
+
+    at = front.grid()
+    t = at[:, 0, 1]
+    rows = np.flatnonzero(front.usable.any(axis=1) & (t > back.first - _MARGIN))
+    if not len(rows):
+        return None
+    part = slice(rows[0], rows[-1] + 1)
+    at = at[part]
+    opposite = across(front, back, at, stand)
+    x, y = back.pixels(opposite)
+
+    def warped(picture: F32) -> F32:
+        made = cv2.remap(padded(picture), x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT)
+        return np.asarray(made, np.float32)
+
+    other = warped(back.tone)
+    both: Mask = front.usable[part] & (warped(back.usable.astype(np.float32)) > 0.99)
+    if both.sum() < _FEW_PIXELS:
+        return None
+    one = front.tone[part] - _trend(front.tone[part] - other, at[..., 1] + opposite[..., 1], both)
+    sigma = math.radians(max(_CALM, 2 * blur)) / front.step
+    one, other = flattened(one, both, sigma), flattened(other, both, sigma)
+    one, other = _blurred(one, other, both, math.radians(blur) / front.step)
+    inner = cv2.erode(both.astype(np.uint8), np.ones((3, 3), np.uint8), borderValue=0)
+    return one, other, np.asarray(inner, np.float32), at
+
+
+def _middles(known: Mask, apart: int) -> Mask:
+    """Where patches' middles are: as many in every column as fit into what is known there."""
+    made = np.zeros(known.shape, np.bool_)
+    for column in np.flatnonzero(known.any(axis=0)):
+        inside = np.flatnonzero(known[:, column])
+        first, high = inside[0], inside[-1] - inside[0] + 1
+        number = max(1, round(high / apart))
+        middle = first + (np.arange(number) + 0.5) * high / number
+        made[np.clip(middle.astype(np.intp), first, inside[-1]), column] = True
+    return made
 
 
 def _trend(apart: F32, height: F64, both: Mask) -> F32:
@@ -163,10 +161,10 @@ def _trend(apart: F32, height: F64, both: Mask) -> F32:
     return np.interp(height, middle, [np.median(parts[i]) for i in known]).astype(np.float32)
 
 
-def _blurred(one: F32, other: F32, both: Mask, sigma: float) -> tuple[F32, F32, Mask]:
+def _blurred(one: F32, other: F32, both: Mask, sigma: float) -> tuple[F32, F32]:
     if sigma < 0.3:
-        return one.astype(np.float32), other.astype(np.float32), both
+        return one, other
     stack = np.dstack([one, other, both]).astype(np.float32)
     made = spread(stack, sigma)
     share = np.maximum(made[..., 2], 1e-3)
-    return np.where(both, made[..., 0] / share, 0), np.where(both, made[..., 1] / share, 0), both
+    return np.where(both, made[..., 0] / share, 0), np.where(both, made[..., 1] / share, 0)
