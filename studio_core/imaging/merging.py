@@ -30,11 +30,13 @@ _Placed = tuple[npt.NDArray[Any], npt.NDArray[Any], Mask, Mask, Mask]
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722], np.float32)
 _BAND = 1 << 18  # pixels worked on at a time
 _UNRESOLVED = 0.5  # relative noise from which a pixel counts as too dark
+_ASTRAY = 1e-3  # weight of a frame that could not be aligned: it tells what no other shows
 
 
 @dataclass(frozen=True, eq=False)
 class _Frame:
-    """One exposure under way. `light` and `weight` of numbers; dropped: share left out, reduced."""
+    """One exposure under way. `light` and `weight` of numbers; dropped: share left out, reduced; trust:
+    what its weight is multiplied by."""
 
     pixels: npt.NDArray[Any]
     clipped: npt.NDArray[np.uint8]
@@ -43,6 +45,7 @@ class _Frame:
     light: Look
     weight: Look
     dropped: F32 | None
+    trust: float
 
 
 def merge(
@@ -82,7 +85,15 @@ def merge(
         dropped, notes = _left_out(looks, [bracket.shots[i].facts.name for i in order])
     job.checkpoint(3, 10)
     frames = [
-        _Frame(picture, clip, _grown(clip) if k else clip, move, *numbers.weighing(picture.dtype, gain), drop)
+        _Frame(
+            picture,
+            clip,
+            _grown(clip) if k else clip,
+            move,
+            *numbers.weighing(picture.dtype, gain),
+            drop,
+            1.0 if move.trusted else _ASTRAY,
+        )
         for k, (picture, clip, move, gain, drop) in enumerate(
             zip(pictures, clips, moves, gains, dropped, strict=True)
         )
@@ -165,7 +176,7 @@ def _band(
             moved |= (drop > 0.5) & (usable > 0)
             usable *= 1 - drop
         weight = frame.weight(around)
-        weight *= usable[..., None]
+        weight *= (usable * np.float32(frame.trust))[..., None]
         weights += weight
         weight *= frame.light(pixels)
         total += weight

@@ -231,6 +231,24 @@ def test_frames_are_laid_over_the_reference() -> None:
     assert np.quantile(stops(good, light, inner), 0.95) < 0.6 * np.quantile(stops(bad, light, inner), 0.95)
 
 
+def test_a_frame_that_was_not_aligned_counts_where_no_other_sees() -> None:
+    light = room(3, *SIZE)
+    light[:40] *= 2.0**-9  # too dark for all but the last exposure
+    camera = Camera()
+    frames = list(taken(camera, light, EVS).shots)
+    frames[-1] = replace(frames[-1], pixels=np.roll(frames[-1].pixels, 7, axis=1))
+    photographs = Bracket(tuple(frames), EVS, (True,) * 4)
+    errors = {}
+    for trusted in (True, False):
+        motions = [*still(3), Motion(correlation=0.2, trusted=trusted)]
+        made = merge(photographs, motions, exact(camera), known(EVS), ghosts=False)
+        seen = ~made.clipped
+        seen[:48] = False
+        errors[trusted] = float(np.quantile(stops(made, light, seen), 0.9))
+        assert (made.light[:40] > 0).mean() > 0.9
+    assert errors[False] < 0.5 * errors[True]
+
+
 def test_turns_behind_a_fisheye_are_undone() -> None:
     light = room(10, *SIZE)
     circle, lens = Circle(80, 60, 55), Lens(fov=190)
