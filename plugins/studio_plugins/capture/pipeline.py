@@ -305,7 +305,8 @@ def _of_motions(brackets: Mapping[str, Bracket], motions: Mapping[str, Sequence[
         return ()
     them = ", ".join(lost)
     return (
-        f"{them}: too little is seen in common with the other exposures to align it; it was left as it is.",
+        f"{them}: too little is in common with the other exposures to align it;"
+        " it counts only where no other shows anything.",
     )
 
 
