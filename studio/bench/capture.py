@@ -292,6 +292,7 @@ UNITS = {
     "registration_seen_deg": "°",
     "fov_error": "°",
     "arcs_log2_mean": "stop",
+    "lens_arcs_log2": "stop",
     "response_log2": "stop",
     "exposure_ev_max": "EV",
 }
@@ -316,6 +317,9 @@ def measured(
         "exposure_ev_max": measure.exposure_error(state, truth),
         "nonfinite": float(measure.nonfinite(state)),
     }
+    left = measure.left_in_lenses(state, truth)
+    if left is not None:
+        values["lens_arcs_log2"] = left
     if state.registration is not None:
         values["registration_deg"] = measure.angle_between(state.registration.rotation, truth.rotation)
         values["registration_seen_deg"] = measure.angle_between(state.registration.rotation, truth.seen)

@@ -137,6 +137,28 @@ def _luminance(colour: npt.NDArray[np.floating]) -> F64:
     return np.asarray(colour @ LUMINANCE, np.float64)
 
 
+def left_in_lenses(state: CaptureState, truth: Truth) -> float | None:
+    """`lens_arcs_log2`: mean log2 of what arcs leave in the lenses' own light, against the same ring beside.
+
+    What the seam takes from the other lens anyway is counted too. None without arcs or for other sizes.
+    """
+    left, weight = 0.0, 0.0
+    for side, light in state.reflections.lights.items() if state.reflections is not None else ():
+        one = truth.side(side)
+        if light.shape != one.clean.shape:
+            return None
+        height, width = one.stops.shape
+        y, x = np.mgrid[0:height, 0:width] + 0.5
+        reach = np.hypot(x - one.circle.x, y - one.circle.y) / one.circle.radius
+        ratio = np.log2((_luminance(light) + 1e-12) / (_luminance(one.clean) + 1e-12))
+        arcs = (one.stops > 0.3) & (reach < 0.985)
+        if arcs.any():
+            beside = (one.stops < 0.02) & (reach > reach[arcs].min()) & (reach < 0.985)
+            left += float((ratio[arcs] - np.median(ratio[beside])).sum())
+            weight += float(arcs.sum())
+    return left / weight if weight else None
+
+
 def angle_between(a: F64, b: F64) -> float:
     """Degrees of the turn from one rotation (3, 3) to another."""
     cosine = (np.trace(a.T @ b) - 1) / 2

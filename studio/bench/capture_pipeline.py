@@ -35,6 +35,7 @@ def measure(
         command += ["-o", str(folder / "room.exr"), "--cubemap", str(folder / "cube"), "--json", "--quiet"]
         found = in_child(command)
     report.add("pipeline", "s", found["seconds"], "s")
+    report.add("pipeline", "cpu_s", found["cpu_seconds"], "s")
     report.add("pipeline", "peak_bytes", found["peak_bytes"], "B")
     report.add("pipeline", "own_peak_bytes", found["own_peak_bytes"], "B")
     report.details["pipeline"] = {"megapixels": megapixels, **found}
@@ -83,7 +84,9 @@ def child() -> None:
     started = time.perf_counter()
     status = main(sys.argv[1:])
     seconds = time.perf_counter() - started
-    own = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
-    others = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss * 1024
-    told = {"status": status, "seconds": seconds, "own_peak_bytes": own, "peak_bytes": own + others}
+    mine, others = (resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
+    own, other = mine.ru_maxrss * 1024, others.ru_maxrss * 1024
+    cpu = sum(used.ru_utime + used.ru_stime for used in (mine, others))
+    told = {"status": status, "seconds": seconds, "cpu_seconds": cpu}
+    told |= {"own_peak_bytes": own, "peak_bytes": own + other}
     print(json.dumps(told), file=sys.stderr)

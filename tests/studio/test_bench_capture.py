@@ -28,6 +28,7 @@ from studio_core.capturing.artifacts import (
     CaptureState,
     Exposures,
     LensLight,
+    Reflections,
     Registration,
     Response,
     Stitched,
@@ -270,6 +271,20 @@ def test_curves_that_differ_by_a_factor_are_one() -> None:
     other = capture_measure.response_error(response, Curve("sRGB"))
     assert other.rms > 0.01
     assert other.log2 > 0.05
+
+
+def test_what_arcs_leave_in_the_lenses_is_counted_in_stops() -> None:
+    phone = replace(PHONE, arcs=(Arc("front", 30, 60, 9, 1.2),))
+    shots = shoot(room(), phone, 1)
+    truth, state = shots.truth, perfect(shots, room())
+    lights = {"front": 0.5 * truth.front.light, "back": 0.5 * truth.back.light}
+    spoilt = replace(state, reflections=Reflections((), lights))
+    left = capture_measure.left_in_lenses(spoilt, truth)
+    assert left == pytest.approx(truth.front.stops[truth.front.stops > 0.3].mean(), rel=0.15)
+    clean = replace(state, reflections=Reflections((), {**lights, "front": 2 * truth.front.clean}))
+    assert capture_measure.left_in_lenses(clean, truth) == pytest.approx(0, abs=1e-3)
+    assert capture_measure.left_in_lenses(state, truth) is None
+    assert "lens_arcs_log2" in capture.measured(spoilt, shots, room())
 
 
 def test_arcs_and_rectangles_are_counted_by_the_azimuths_they_share() -> None:
