@@ -1,7 +1,7 @@
 """Capture: two fisheye photographs of a room, at several exposures, become an HDR environment (cuts.txt, IV).
 
-Stages are pure functions of pictures and settings; `pipeline` puts them in order, `progress` remembers what
-they made. What materials need too (response, merging, alignment, cloning, lenses) is in `studio_core.imaging`.
+Stages are pure functions of pictures and settings; `pipeline` puts them in order, `progress` remembers
+what they made. What materials need too (response, merging, alignment, cloning) is in `studio_core.imaging`.
 
 - photographs: `bracket` (with `bracket_sides`, `_looks`, `_turns`, `_exposures`)
 - lenses: `circle`, `circle_edge`; `sides` takes two circles in one picture apart
