@@ -162,11 +162,13 @@ def covered(room: F32, phone: Phone) -> bool:
 
 @dataclass(frozen=True)
 class Case:
-    """`removal`: of reflections; `wrong`: a listed step is wrong by up to 1 EV; `glare`: light is spread;
-    `meter`: two readings of a light meter tell how bright clipped lamps are."""
+    """`removal`: of reflections; `wrong`: a listed step is wrong by up to 1 EV; `near`: things near enough
+    that both lenses see them elsewhere; `glare`: light is spread; `meter`: two readings of a light meter tell
+    how bright clipped lamps are."""
 
     removal: bool = True
     wrong: bool = False
+    near: bool = False
     glare: bool = False
     meter: bool = False
 
@@ -175,7 +177,8 @@ CASES = {
     "default": Case(),
     "no-removal": Case(removal=False),
     "wrong-table": Case(wrong=True),
-    "glare": Case(glare=True),
+    "near": Case(near=True),
+    "glare": Case(near=True, glare=True),
     "lamps": Case(meter=True),
 }
 
@@ -225,6 +228,7 @@ def _over_phones(
         for kind in wanted:
             case, wrong = CASES[kind], None
             phone = drawn if case.glare else replace(drawn, glare=0.0)
+            phone = phone if case.near else replace(phone, parallax=0.0)
             if case.meter and covered(room, phone):
                 continue
             if case.wrong:
