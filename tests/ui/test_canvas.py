@@ -157,7 +157,10 @@ def test_lamps_are_drawn_and_can_be_clicked(driver: Driver) -> None:
     driver.click((0.0, 2.0, 0.0))
     assert driver.session.selection == ("lamp",)
     drag(driver, QPoint(40, 0), (0.0, 2.0, 0.0))
-    assert driver.labels()[-1] == "Move Lamp 35 cm"
+    far = np.linalg.norm(np.subtract(driver.document.scene.world("lamp").translation, (0.0, 2.0, 0.0)))
+    assert far == pytest.approx(0.05 * round(far / 0.05)), "on the grid, as fine as this canvas shows it"
+    assert 0.2 < far < 0.6
+    assert driver.labels()[-1] == f"Move Lamp {round(100 * far)} cm"
 
 
 def test_the_wheel_zooms_to_the_cursor_and_the_middle_button_orbits(driver: Driver) -> None:

@@ -444,8 +444,7 @@ def test_undo_and_another_project_take_the_capture_away(wizard: Wizard) -> None:
     wizard.driver.until(lambda: wizard.work.isVisible())
     assert wizard.desk.capture is wizard.capture
     wizard.driver.show(room())
-    wizard.driver.until(lambda: wizard.panel.empty.isVisible())
-    assert not wizard.desk.busy
+    wizard.driver.until(lambda: wizard.panel.empty.isVisible() and not wizard.desk.busy)
 
 
 def test_where_it_is_narrow_the_preview_is_above(wizard: Wizard) -> None:
