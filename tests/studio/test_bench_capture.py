@@ -245,7 +245,14 @@ def test_rows_of_every_case(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
     assert main(arguments) == 0
     found = {(row["case"], row["metric"]): row["value"] for row in json.loads(rows.read_text())["rows"]}
     cases = {case for case, _ in found}
-    assert cases == {"sunset/default", "sunset/no-removal", "sunset/wrong-table", "sunset/glare", "clone"}
+    assert cases == {
+        "sunset/default",
+        "sunset/no-removal",
+        "sunset/wrong-table",
+        "sunset/glare",
+        "sunset/near",
+        "clone",
+    }
     named = (
         "irradiance_rel_rmse",
         "pixel_log2_median",
