@@ -265,7 +265,7 @@ def test_rows_of_every_case(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
     assert found["sunset/default", "irradiance_rel_rmse"] < 0.01
     assert found["sunset/wrong-table", "wrong_named"] == 0  # nothing was named
     assert found["clone", "rel_error"] < 1e-6
-    assert [s.reflections.automatic for s in photographer.asked] == [True, False, True, True]
+    assert [s.reflections.automatic for s in photographer.asked] == [True, False, True, True, True]
     assert all(len(s.bracket.shots) == 6 for s in photographer.asked)
 
 
