@@ -7,10 +7,10 @@ from collections.abc import Callable
 import numpy as np
 
 from studio_core.capturing.artifacts import Registration, View
+from studio_core.capturing.standing import HALF_TURN
 from studio_core.imaging.latlong import equirect_direction, pixel_solid_angles
 from studio_core.imaging.projection import Circle, Lens, pixel_points, unproject
 
-HALF_TURN = np.diag([-1.0, 1.0, -1.0])
 Sky = Callable[[np.ndarray], np.ndarray]
 
 

@@ -14,6 +14,7 @@ import numpy.typing as npt
 from studio.bench.phone import Shots
 from studio_core.capturing.artifacts import Calibration, Captured, CaptureState
 from studio_core.capturing.settings import BACK, FRONT
+from studio_core.capturing.standing import HALF_TURN
 from studio_core.imaging.latlong import equirect_direction
 from studio_core.imaging.projection import project
 from studio_core.scene.geometry import Image
@@ -28,13 +29,12 @@ def floor(shots: Shots, width: int) -> CaptureState:
     height, n = width // 2, FINER
     light = np.zeros((height, width, 3), np.float32)
     rows = max(1, 200_000 // (width * n * n))
-    half_turn = np.diag([-1.0, 1.0, -1.0])
     for top in range(0, height, rows):
         bottom = min(top + rows, height)
         v = (top + (np.arange((bottom - top) * n) + 0.5) / n) / height
         u = (np.arange(width * n) + 0.5) / n / width
         finished = equirect_direction(*np.meshgrid(u, v))
-        part = _seen(shots, (finished @ half_turn).reshape(-1, 3))
+        part = _seen(shots, (finished @ HALF_TURN).reshape(-1, 3))
         light[top:bottom] = part.reshape(bottom - top, n, width, n, 3).mean((1, 3))
     unresolved = np.zeros((height, width), np.uint8)
     captured = Captured(Image(light), np.zeros((6, 1, 1, 3), np.float32), unresolved, Calibration())

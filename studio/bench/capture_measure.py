@@ -13,6 +13,7 @@ from studio.bench.phone_optics import look_up
 from studio.bench.phone_response import Curve
 from studio_core.capturing.artifacts import CaptureState, Response
 from studio_core.capturing.settings import BACK, SIDES
+from studio_core.capturing.standing import HALF_TURN
 from studio_core.colour import LUMINANCE as WEIGHTS
 from studio_core.imaging.latlong import equirect_direction, pixel_solid_angles
 from studio_core.imaging.projection import project
@@ -213,5 +214,5 @@ def nonfinite(state: CaptureState) -> int:
 
 def finished_from_room(state: CaptureState, truth: Truth) -> F64:
     """(3, 3): where the finished picture shows a direction of the room, as far as the capture knows."""
-    upright = state.stitched.upright if state.stitched is not None else np.diag([-1.0, 1.0, -1.0])
+    upright = state.stitched.upright if state.stitched is not None else HALF_TURN
     return np.asarray(upright @ truth.room_from_front.T, np.float64)

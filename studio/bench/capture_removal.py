@@ -19,7 +19,6 @@ import numpy.typing as npt
 
 from studio.bench.harness import Report
 from studio.bench.phone import Phone, SideTruth, Truth, lens_light
-from studio.bench.phone_optics import turn
 from studio.bench.phone_random import random_phone
 from studio_core.capturing.artifacts import Registration, View
 from studio_core.capturing.settings import (
@@ -29,6 +28,7 @@ from studio_core.capturing.settings import (
     Patch,
     ReflectionSettings,
 )
+from studio_core.capturing.standing import euler
 from studio_core.imaging.projection import Lens, pixel_points, unproject
 from studio_core.shading.job import Job
 
@@ -137,7 +137,7 @@ def known(truth: Truth, clean: bool, seed: int) -> tuple[dict[str, View], Regist
     """The truth, but for 0.2° of rotation, 0.2 % of the field of view, 5 % of gain and of falloff."""
     rng = np.random.default_rng([seed, 9])
     phone = truth.phone
-    rotation = turn(*rng.normal(0, 0.12, 3)) @ truth.rotation
+    rotation = euler(*rng.normal(0, 0.12, 3)) @ truth.rotation
     gain = np.exp(rng.normal(0, 0.05, 3))
     lens = phone.lens.with_fov(phone.lens.fov * (1 + rng.normal(0, 0.002)))
     lost = float(np.clip(phone.falloff + rng.normal(0, 0.05), 0, 0.9))

@@ -14,10 +14,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from studio.bench.phone_optics import HALF_TURN, Mover, Pose, Rays, Room, turn
+from studio.bench.phone_optics import Mover, Pose, Rays, Room
 from studio.bench.phone_response import Curve
 from studio_core.capturing.artifacts import Motion, View
 from studio_core.capturing.settings import BACK, FRONT, SIDES
+from studio_core.capturing.standing import HALF_TURN, euler
 from studio_core.imaging.photograph import Photograph, ShotFacts
 from studio_core.imaging.projection import Circle, Lens
 
@@ -243,8 +244,8 @@ def developed(phone: Phone, exposure: npt.NDArray[Any], rng: np.random.Generator
 def _placed(environment: F32, phone: Phone, seed: int) -> tuple[Room, dict[str, Pose]]:
     rng = np.random.default_rng([seed, 1])
     nearness = np.concatenate([rng.normal(0, 1.6, (3, 3)), rng.uniform(0, 6.28, (1, 3))])
-    front = HALF_TURN @ turn(*phone.tilt)
-    back = front @ HALF_TURN @ turn(*phone.misalignment)
+    front = HALF_TURN @ euler(*phone.tilt)
+    back = front @ HALF_TURN @ euler(*phone.misalignment)
     apart = np.radians(phone.parallax) / 2
     sideways = rng.normal(0, 0.25, 3)
     along = -front[:, 2] + sideways
@@ -300,7 +301,7 @@ def exposure_scale(truth: Truth) -> float:
 def _hand(phone: Phone, rng: np.random.Generator, reference: int) -> tuple[F64, ...]:
     turns = rng.normal(0, phone.shake, (len(phone.evs), 3))
     turns[reference] = 0
-    return tuple(turn(*degrees) for degrees in turns)
+    return tuple(euler(*degrees) for degrees in turns)
 
 
 def _movers(phone: Phone, side: str, room: Room, rng: np.random.Generator) -> tuple[Mover, ...]:
@@ -311,7 +312,7 @@ def _movers(phone: Phone, side: str, room: Room, rng: np.random.Generator) -> tu
     light = np.median(room.light, axis=(0, 1)) * rng.uniform(0.3, 3.0)
     made = []
     for index in range(len(phone.evs)):
-        towards = turn(yaw + 3 * phone.mover * index, pitch, 0) @ np.array([0.0, 0.0, -1.0])
+        towards = euler(yaw + 3 * phone.mover * index, pitch, 0) @ np.array([0.0, 0.0, -1.0])
         made.append(Mover(towards, phone.mover, light.astype(np.float64)))
     return tuple(made)
 

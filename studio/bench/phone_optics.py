@@ -22,19 +22,8 @@ if TYPE_CHECKING:
 
 F32 = npt.NDArray[np.float32]
 F64 = npt.NDArray[np.float64]
-HALF_TURN = np.diag([-1.0, 1.0, -1.0])
 ARC_BORDER = 3.0
 _BAND = 400_000
-
-
-def turn(yaw: float, pitch: float, roll: float) -> F64:
-    """(3, 3) turn by degrees about z (roll), then x (pitch), then y (yaw)."""
-    y, x, z = np.radians([yaw, pitch, roll])
-    about_y = np.array([[np.cos(y), 0, np.sin(y)], [0, 1, 0], [-np.sin(y), 0, np.cos(y)]])
-    about_x = np.array([[1, 0, 0], [0, np.cos(x), -np.sin(x)], [0, np.sin(x), np.cos(x)]])
-    about_z = np.array([[np.cos(z), -np.sin(z), 0], [np.sin(z), np.cos(z), 0], [0, 0, 1]])
-    made: F64 = about_y @ about_x @ about_z
-    return made
 
 
 @dataclass(frozen=True, eq=False)

@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 from studio.bench import capture, capture_clone, capture_measure, capture_reflections
 from studio.bench.harness import Report
 from studio.bench.phone import Arc, Phone, Shots, shoot
-from studio.bench.phone_optics import look_up, turn
+from studio.bench.phone_optics import look_up
 from studio.bench.phone_random import random_phone
 from studio.bench.phone_response import Curve
 from studio.cli import main
@@ -34,6 +34,7 @@ from studio_core.capturing.artifacts import (
     Stitched,
 )
 from studio_core.capturing.settings import Patch
+from studio_core.capturing.standing import HALF_TURN, euler
 from studio_core.imaging.encode import write_exr
 from studio_core.imaging.latlong import equirect_direction
 from studio_core.imaging.projection import Circle
@@ -52,7 +53,7 @@ def room(height: int = 64) -> np.ndarray:
 def perfect(shots: Shots, light: np.ndarray, settings: Any = None) -> CaptureState:
     """What a capture without any error ends in; the finished picture is turned as it likes."""
     truth, height = shots.truth, light.shape[0]
-    upright = turn(30, 0, 0) @ np.diag([-1.0, 1.0, -1.0])
+    upright = euler(30, 0, 0) @ HALF_TURN
     u, v = np.meshgrid((np.arange(2 * height) + 0.5) / (2 * height), (np.arange(height) + 0.5) / height)
     finished = equirect_direction(u, v).reshape(-1, 3)
     pixels = 3 * look_up(light, finished @ upright @ truth.room_from_front.T).reshape(light.shape)
@@ -103,7 +104,7 @@ def test_a_lens_picture_with_its_true_geometry_is_the_room() -> None:
     found = capture.floor_of(shots, room(), 128)
     assert found["floor_irradiance_rel_rmse"] < 2e-3
     assert found["floor_pixel_log2_median"] < 5e-3
-    bent = replace(shots.truth, rotation=shots.truth.rotation @ turn(20, 0, 0))
+    bent = replace(shots.truth, rotation=shots.truth.rotation @ euler(20, 0, 0))
     assert capture.floor_of(replace(shots, truth=bent), room(), 128)["floor_irradiance_rel_rmse"] > 0.01
 
 
@@ -120,7 +121,7 @@ def test_errors_are_as_large_as_they_were_made() -> None:
     spoilt = replace(
         state,
         captured=replace(state.captured, environment=Image(pixels)),
-        registration=replace(state.registration, rotation=state.registration.rotation @ turn(0, 0, 1.25)),
+        registration=replace(state.registration, rotation=state.registration.rotation @ euler(0, 0, 1.25)),
         response=replace(state.response, curve=state.response.curve * 1.1),
         lights={
             **state.lights,
@@ -144,8 +145,8 @@ def test_errors_are_as_large_as_they_were_made() -> None:
 @given(st.floats(-180, 180), st.floats(-80, 80), st.floats(0, 179))
 @settings(max_examples=20)
 def test_the_angle_between_turns(yaw: float, pitch: float, degrees: float) -> None:
-    a = turn(yaw, pitch, 10)
-    assert capture_measure.angle_between(a, a @ turn(degrees, 0, 0)) == pytest.approx(degrees, abs=1e-5)
+    a = euler(yaw, pitch, 10)
+    assert capture_measure.angle_between(a, a @ euler(degrees, 0, 0)) == pytest.approx(degrees, abs=1e-5)
 
 
 def test_lamps_are_turned_down_to_what_the_darkest_exposure_resolves() -> None:
@@ -170,7 +171,7 @@ def test_a_meter_reads_the_room_without_and_with_what_is_clipped() -> None:
     bright = room()
     bright[20:22, 60:62] = 5000
     shots = shoot(bright, PHONE, 1)
-    turned = turn(30, 0, 0)
+    turned = euler(30, 0, 0)
     told = capture.with_meter(bright, shots, turned)
     u, v = 61 / 128, 21 / 64
     np.testing.assert_allclose(told.facing, turned @ equirect_direction(u, v), atol=0.01)

@@ -14,9 +14,9 @@ import pytest
 from studio.bench.capture_measure import irradiance_error
 from studio.bench.phone import Arc, Phone, Shots, shoot
 from studio.bench.phone_files import as_dual, write_photograph, write_shots
-from studio.bench.phone_optics import HALF_TURN
 from studio.bench.phone_response import Curve
 from studio.cli import BAD_INPUT, main
+from studio_core.capturing.standing import HALF_TURN
 from studio_core.imaging.encode import write_exr
 from studio_core.imaging.environment import load_environment
 from studio_core.imaging.photograph import Photograph, ShotFacts

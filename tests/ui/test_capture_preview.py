@@ -12,6 +12,7 @@ from PySide6.QtCore import QPointF, Qt
 from pytestqt.qtbot import QtBot
 
 from studio_core.capturing.settings import Patch
+from studio_core.capturing.standing import user_turn
 from studio_core.imaging.latlong import direction_to_uv, equirect_direction
 from studio_core.imaging.projection import KANNALA_BRANDT, Circle, Lens
 from studio_ui.capture.preview import picture_view
@@ -23,7 +24,7 @@ from studio_ui.capture.preview.sight import LARGEST, Part, Sight, fitted, part_s
 from studio_ui.capture.preview.tone import displayed, natural_exposure
 from studio_ui.capture.preview.turned import turned
 from studio_ui.capture.tools.ring import LEAST, at_ring, dragged, drawn, grip_at, inside, ring_points
-from studio_ui.capture.turning import angles_of, between, user_turn
+from studio_ui.capture.turning import between
 
 sizes = st.tuples(st.integers(50, 3000), st.integers(50, 3000))
 shares = st.floats(0, 1)
@@ -112,18 +113,6 @@ def test_the_histogram_counts_every_pixel_once() -> None:
 
 
 # turning
-
-
-@given(st.floats(-89, 89), degrees, degrees)
-def test_angles_of_a_turn(pitch, roll, north) -> None:
-    turn = user_turn(pitch, roll, north)
-    assert np.allclose(user_turn(*angles_of(turn)), turn, atol=1e-9)
-
-
-def test_straight_up_has_angles_too() -> None:
-    for pitch in (90.0, -90.0):
-        turn = user_turn(pitch, 20.0, 30.0)
-        assert np.allclose(user_turn(*angles_of(turn)), turn, atol=1e-7)
 
 
 @given(st.floats(0.01, 0.99), st.floats(0.02, 0.98), st.floats(0.01, 0.99), st.floats(0.02, 0.98))

@@ -7,29 +7,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 from ui_support import Make, room
 
 from studio.bench.phone import Arc, Phone, shoot
 from studio.bench.phone_files import write_shots
-from studio_core.capturing.settings import StitchSettings
 from studio_core.imaging.environment import load_environment
 from studio_core.imaging.projection import Circle, Lens
 from studio_core.scene.nodes import Environment
 from studio_plugins.brdfs import plugin as brdfs
 from studio_plugins.capture import plugin as capture
-from studio_plugins.capture.stitch import turned
-from studio_ui.capture.turning import user_turn
 
 MAPS = Path(os.environ.get("LUCARNE_TEST_DATA", "../shared/data")) / "cc0" / "hdri_polyhaven_cc0"
-degrees = st.floats(-180, 180)
-
-
-@given(degrees, degrees, degrees)
-def test_the_window_turns_as_the_stitching_does(pitch: float, roll: float, north: float) -> None:
-    settings = StitchSettings(pitch=pitch, roll=roll, north=north)
-    assert np.allclose(user_turn(pitch, roll, north), turned(settings), atol=1e-12)
 
 
 @pytest.mark.slow

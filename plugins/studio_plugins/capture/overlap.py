@@ -14,10 +14,10 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from studio_core.capturing.artifacts import F32, F64, Mask, View
+from studio_core.capturing.standing import HALF_TURN
 from studio_core.colour import LUMINANCE
 from studio_core.imaging.projection import Circle, Lens, project
 
-HALF_TURN = np.diag([-1.0, 1.0, -1.0])
 _FINER = 1.5
 _FLOOR = 1e-4
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from studio_core.capturing.artifacts import F32, F64, Mask, Registration, Stitched, View
 from studio_core.capturing.settings import BACK, FEATHER, FRONT, StitchSettings
+from studio_core.capturing.standing import HALF_TURN, user_turn
 from studio_core.errors import InputError
 from studio_core.imaging.latlong import direction_to_uv, equirect_direction
 from studio_core.imaging.resample import resize_area
@@ -21,8 +22,6 @@ from studio_plugins.capture.level import Level, find_level
 from studio_plugins.capture.sampling import COARSE, Seen, Source, harshness, lens_source, look_through
 from studio_plugins.capture.seam import Joint, join
 
-HALF_TURN = np.diag([-1.0, 1.0, -1.0])
-"""The finished picture's frame from the front lens' frame when nothing is levelled or turned."""
 _TILE = (128, 256)
 _BORDER = 4
 _LEVEL_WIDTH = 1280
@@ -62,15 +61,8 @@ def level_of(
 
 
 def turned(settings: StitchSettings) -> F64:
-    """(3, 3) what the designer turns, after levelling.
-
-    `roll` turns the picture clockwise, `pitch` moves its middle up, `north` then moves it to the right.
-    """
-    p, r, n = (math.radians(a) for a in (settings.pitch, settings.roll, settings.north))
-    about_x = np.array([[1, 0, 0], [0, math.cos(p), math.sin(p)], [0, -math.sin(p), math.cos(p)]])
-    about_y = np.array([[math.cos(n), 0, -math.sin(n)], [0, 1, 0], [math.sin(n), 0, math.cos(n)]])
-    about_z = np.array([[math.cos(r), -math.sin(r), 0], [math.sin(r), math.cos(r), 0], [0, 0, 1]])
-    return np.asarray(about_y @ about_x @ about_z, np.float64)
+    """(3, 3) what the designer turns, after levelling."""
+    return user_turn(settings.pitch, settings.roll, settings.north)
 
 
 def stitch_equirectangular(

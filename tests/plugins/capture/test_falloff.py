@@ -13,9 +13,10 @@ from hypothesis import strategies as st
 
 from studio.bench.phone import Arc, Phone, lens_light
 from studio_core.capturing.artifacts import F32, F64, Registration, light_at
+from studio_core.capturing.standing import HALF_TURN
 from studio_core.imaging.projection import Circle, Lens
 from studio_plugins.capture.falloff import Balance, balanced, from_loss
-from studio_plugins.capture.overlap import HALF_TURN, Stand, unroll
+from studio_plugins.capture.overlap import Stand, unroll
 
 Shape = Callable[[float, F64], F64]
 FAMILIES: dict[str, Shape] = {

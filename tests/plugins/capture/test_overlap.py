@@ -10,11 +10,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from studio_core.capturing.artifacts import F64, View
-from studio_core.capturing.standing import rotation_from
+from studio_core.capturing.standing import HALF_TURN, rotation_from
 from studio_core.imaging.projection import EQUISOLID, KANNALA_BRANDT, Circle, Lens, pixel_points, unproject
 from studio_plugins.capture.guesses import by_features, by_rolling, by_sliding
 from studio_plugins.capture.overlap import (
-    HALF_TURN,
     Stand,
     Strip,
     across,

@@ -10,13 +10,11 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from studio.bench.phone import Arc, Phone, Truth, lens_light
 from studio_core.capturing.artifacts import F32, F64, View
 from studio_core.capturing.settings import LensSettings, RegistrationSettings
-from studio_core.capturing.standing import angles_of, rotation_from
+from studio_core.capturing.standing import rotation_from
 from studio_core.errors import Cancelled
 from studio_core.imaging.environment import load_environment
 from studio_core.imaging.projection import KANNALA_BRANDT, ORTHOGRAPHIC, Circle, Lens
@@ -214,18 +212,3 @@ def test_it_can_be_cancelled(plain: Truth) -> None:
     job.cancel()
     with pytest.raises(Cancelled):
         register(*views(plain), RegistrationSettings(), LensSettings(), job)
-
-
-angles = st.floats(-179, 179)
-
-
-@given(angles, st.floats(-85, 85), angles)
-def test_angles_there_and_back(yaw: float, pitch: float, roll: float) -> None:
-    found = angles_of(rotation_from(yaw, pitch, roll))
-    assert found == pytest.approx((yaw, pitch, roll), abs=1e-5)
-
-
-@given(angles, st.sampled_from((-90.0, 90.0)), angles)
-def test_straight_up_the_rotation_is_the_same(yaw: float, pitch: float, roll: float) -> None:
-    rotation = rotation_from(yaw, pitch, roll)
-    assert rotation_from(*angles_of(rotation)) == pytest.approx(rotation, abs=1e-5)

@@ -7,11 +7,12 @@ from PySide6.QtWidgets import QPushButton
 
 from studio_core.capturing.artifacts import Stitched
 from studio_core.capturing.settings import StitchSettings
+from studio_core.capturing.standing import user_angles, user_turn
 from studio_ui.capture.desk import CaptureDesk
 from studio_ui.capture.preview.picture import Mark, Shown
 from studio_ui.capture.steps.step import CLIPPED, UNSEEN, StepForm, direction_text
 from studio_ui.capture.tools.turn_tool import TurnTool
-from studio_ui.capture.turning import F64, angles_of, between, user_turn
+from studio_ui.capture.turning import F64, between
 from studio_ui.context import Context
 from studio_ui.panels.panel import note, row
 
@@ -77,7 +78,7 @@ class JoinStep(StepForm):
 
     def _turned(self, start: tuple[float, float], end: tuple[float, float], level: bool) -> dict[str, float]:
         """The angles after what was at `start` when the drag began has come to `end`."""
-        found = angles_of(between(start, end, level=level) @ _turn(self._start))
+        found = user_angles(between(start, end, level=level) @ _turn(self._start))
         return {name: round(angle, 3) for name, angle in zip(_ANGLES, found, strict=True)}
 
     def _nudge(self, start: tuple[float, float], end: tuple[float, float], level: bool) -> None:
