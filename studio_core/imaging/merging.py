@@ -16,6 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from studio_core.capturing.artifacts import Bracket, Exposures, LensLight, Mask, Motion, Response
+from studio_core.colour import LUMINANCE
 from studio_core.imaging.ghosts import Look as Reduced
 from studio_core.imaging.ghosts import left_out, reduced
 from studio_core.imaging.numbers import Look, Numbers
@@ -27,7 +28,7 @@ from studio_core.shading.job import Job
 
 F32 = npt.NDArray[np.float32]
 _Placed = tuple[npt.NDArray[Any], npt.NDArray[Any], Mask, Mask, Mask]
-LUMINANCE = np.array([0.2126, 0.7152, 0.0722], np.float32)
+_LUMINANCE = np.array(LUMINANCE, np.float32)
 _BAND = 1 << 18  # pixels worked on at a time
 _UNRESOLVED = 0.5  # relative noise from which a pixel counts as too dark
 _ASTRAY = 1e-3  # weight of a frame that could not be aligned: it tells what no other shows
@@ -187,8 +188,8 @@ def _band(
     if not resolved.all():
         here = np.nonzero(~resolved)
         light[here], clipped[here] = _unresolved(frames, looks, here)
-    level = light @ LUMINANCE
-    spread = np.reciprocal(weights, out=weights) @ LUMINANCE**2
+    level = light @ _LUMINANCE
+    spread = np.reciprocal(weights, out=weights) @ _LUMINANCE**2
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         noise = np.where(resolved & (level > 0), np.sqrt(spread) / level, np.float32(1))
     noise = np.minimum(noise, np.float32(1))

@@ -9,6 +9,7 @@ import numpy as np
 from PySide6.QtGui import QAction, QResizeEvent
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QMenu, QSizePolicy, QToolButton, QVBoxLayout, QWidget
 
+from studio_core.colour import LUMINANCE
 from studio_core.params import ParamInfo, Value
 from studio_ui.capture.preview.histogram import Histogram, HistogramView, histogram
 from studio_ui.capture.preview.picture import Shown
@@ -23,7 +24,6 @@ _EXPOSURE = ParamInfo(
     "number", "Exposure", "How bright the preview is; changes nothing but what is shown", "EV", -16.0, 16.0
 )
 _NARROW, _LOW = 520, 360  # pixels of the preview, under which there is no room for the histogram
-_LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 
 
 class Preview(QWidget):
@@ -211,7 +211,7 @@ class Preview(QWidget):
         values = shown.pixels[y, x]
         parts = [f"{x}, {y}", f"RGB {numbers(values)}"]
         if not shown.encoded:
-            luminance = float(linear(values) @ _LUMINANCE)
+            luminance = float(linear(values) @ np.array(LUMINANCE))
             if self.scale is not None:
                 parts.append(f"{luminance * self.scale:.4g} cd/m²")
             else:
