@@ -8,7 +8,7 @@ import numpy as np
 
 from studio_core.capturing.artifacts import Registration, View
 from studio_core.capturing.standing import HALF_TURN
-from studio_core.imaging.latlong import equirect_direction, pixel_solid_angles
+from studio_core.imaging.latlong import pixel_directions, pixel_solid_angles
 from studio_core.imaging.projection import Circle, Lens, pixel_points, unproject
 
 Sky = Callable[[np.ndarray], np.ndarray]
@@ -23,8 +23,7 @@ def smooth_sky(directions: np.ndarray) -> np.ndarray:
 
 def sphere(height: int) -> np.ndarray:
     """(height, 2 height, 3) directions of an equirectangular picture's pixels."""
-    u, v = (np.arange(2 * height) + 0.5) / (2 * height), (np.arange(height) + 0.5) / height
-    return equirect_direction(u[None, :], v[:, None])
+    return pixel_directions(height, 2 * height)
 
 
 def lens_view(sky: Sky, lens: Lens, rotation: np.ndarray, size: int = 200) -> View:

@@ -37,7 +37,7 @@ from studio_core.capturing.settings import (
     Shot,
     StitchSettings,
 )
-from studio_core.imaging.latlong import equirect_direction, pixel_solid_angles
+from studio_core.imaging.latlong import pixel_directions, pixel_solid_angles
 
 if TYPE_CHECKING:
     from studio_core.contract import CaptureRun
@@ -277,9 +277,8 @@ def with_meter(
     resolved = dimmed(room, shots.truth.phone)
     clipped = np.any(room > resolved, axis=2)
     height, width = clipped.shape
-    u, v = np.meshgrid((np.arange(width) + 0.5) / width, (np.arange(height) + 0.5) / height)
     lost = (room - resolved).sum(axis=2) * pixel_solid_angles(height, width)[:, None]
-    facing = (equirect_direction(u, v) * lost[:, :, None]).sum(axis=(0, 1))
+    facing = (pixel_directions(height, width) * lost[:, :, None]).sum(axis=(0, 1))
     facing /= np.linalg.norm(facing)
     shaded = np.where(clipped[:, :, None], np.float32(0), room)
     read = [measure.irradiance(light, facing[None])[0] @ measure.LUMINANCE for light in (shaded, room)]

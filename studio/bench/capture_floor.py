@@ -15,7 +15,7 @@ from studio.bench.phone import Shots
 from studio_core.capturing.artifacts import Calibration, Captured, CaptureState
 from studio_core.capturing.settings import BACK, FRONT
 from studio_core.capturing.standing import HALF_TURN
-from studio_core.imaging.latlong import equirect_direction
+from studio_core.imaging.latlong import pixel_directions
 from studio_core.imaging.projection import project
 from studio_core.scene.geometry import Image
 
@@ -31,9 +31,7 @@ def floor(shots: Shots, width: int) -> CaptureState:
     rows = max(1, 200_000 // (width * n * n))
     for top in range(0, height, rows):
         bottom = min(top + rows, height)
-        v = (top + (np.arange((bottom - top) * n) + 0.5) / n) / height
-        u = (np.arange(width * n) + 0.5) / n / width
-        finished = equirect_direction(*np.meshgrid(u, v))
+        finished = pixel_directions(height * n, width * n, slice(top * n, bottom * n))
         part = _seen(shots, (finished @ HALF_TURN).reshape(-1, 3))
         light[top:bottom] = part.reshape(bottom - top, n, width, n, 3).mean((1, 3))
     unresolved = np.zeros((height, width), np.uint8)

@@ -15,7 +15,7 @@ from studio_core.capturing.artifacts import CaptureState, Response
 from studio_core.capturing.settings import BACK, SIDES
 from studio_core.capturing.standing import HALF_TURN
 from studio_core.colour import LUMINANCE as WEIGHTS
-from studio_core.imaging.latlong import equirect_direction, pixel_solid_angles
+from studio_core.imaging.latlong import pixel_directions, pixel_solid_angles
 from studio_core.imaging.projection import project
 
 F32 = npt.NDArray[np.float32]
@@ -32,8 +32,7 @@ NORMALS /= np.linalg.norm(NORMALS, axis=1, keepdims=True)
 def irradiance(light: F32, normals: F64) -> F64:
     """(N, 3) of an equirectangular picture, for surfaces that face `normals` (N, 3)."""
     height, width = light.shape[:2]
-    u, v = np.meshgrid((np.arange(width) + 0.5) / width, (np.arange(height) + 0.5) / height)
-    directions = equirect_direction(u, v).reshape(-1, 3)
+    directions = pixel_directions(height, width).reshape(-1, 3)
     weighted = light.reshape(-1, 3) * np.repeat(pixel_solid_angles(height, width), width)[:, None]
     made = [np.maximum(directions @ normal, 0) @ weighted for normal in normals]
     return np.array(made, np.float64)
@@ -78,8 +77,7 @@ def pixel_error(
     assert state.captured is not None
     resolution = min(resolution, truth_light.shape[1])
     height, width = resolution // 2, resolution
-    v, u = np.meshgrid((np.arange(height) + 0.5) / height, (np.arange(width) + 0.5) / width, indexing="ij")
-    room = equirect_direction(u, v).reshape(-1, 3)
+    room = pixel_directions(height, width).reshape(-1, 3)
     exact = _calmed(truth_light, resolution).reshape(-1, 3)
     turned = room @ finished_from_room.T
     made = look_up(_calmed(state.captured.environment.pixels, resolution), turned)

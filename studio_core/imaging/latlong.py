@@ -10,6 +10,8 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+_ALL = slice(None)
+
 
 def equirect_direction(u: npt.ArrayLike, v: npt.ArrayLike) -> npt.NDArray[np.float64]:
     """(..., 3) unit directions of picture coordinates in 0…1, v down."""
@@ -18,6 +20,15 @@ def equirect_direction(u: npt.ArrayLike, v: npt.ArrayLike) -> npt.NDArray[np.flo
     longitude, polar = np.broadcast_arrays(longitude, polar)
     ring = np.sin(polar)
     return np.stack([ring * np.sin(longitude), np.cos(polar), ring * np.cos(longitude)], axis=-1)
+
+
+def pixel_directions(
+    height: int, width: int, rows: slice = _ALL, columns: slice = _ALL
+) -> npt.NDArray[np.float64]:
+    """(H, W, 3) unit directions of the middles of a picture's pixels, or of a part's."""
+    u = ((np.arange(width) + 0.5) / width)[columns]
+    v = ((np.arange(height) + 0.5) / height)[rows]
+    return equirect_direction(u[None, :], v[:, None])
 
 
 def direction_to_uv(directions: npt.ArrayLike) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:

@@ -36,7 +36,7 @@ from studio_core.capturing.artifacts import (
 from studio_core.capturing.settings import Patch
 from studio_core.capturing.standing import HALF_TURN, euler
 from studio_core.imaging.encode import write_exr
-from studio_core.imaging.latlong import equirect_direction
+from studio_core.imaging.latlong import equirect_direction, pixel_directions
 from studio_core.imaging.projection import Circle
 from studio_core.scene.geometry import Image
 from studio_core.shading.job import Job
@@ -45,8 +45,7 @@ PHONE = Phone(size=(80, 64), circle=Circle(40, 31, 29), samples=1, tilt=(10, 5, 
 
 
 def room(height: int = 64) -> np.ndarray:
-    u, v = np.meshgrid((np.arange(2 * height) + 0.5) / (2 * height), (np.arange(height) + 0.5) / height)
-    d = equirect_direction(u, v)
+    d = pixel_directions(height, 2 * height)
     return (1 + 0.4 * d + 0.3 * d[..., [1, 2, 0]] ** 2).astype(np.float32)
 
 
@@ -54,8 +53,7 @@ def perfect(shots: Shots, light: np.ndarray, settings: Any = None) -> CaptureSta
     """What a capture without any error ends in; the finished picture is turned as it likes."""
     truth, height = shots.truth, light.shape[0]
     upright = euler(30, 0, 0) @ HALF_TURN
-    u, v = np.meshgrid((np.arange(2 * height) + 0.5) / (2 * height), (np.arange(height) + 0.5) / height)
-    finished = equirect_direction(u, v).reshape(-1, 3)
+    finished = pixel_directions(height, 2 * height).reshape(-1, 3)
     pixels = 3 * look_up(light, finished @ upright @ truth.room_from_front.T).reshape(light.shape)
     none = np.zeros(light.shape[:2], bool)
     phone = truth.phone

@@ -15,7 +15,7 @@ from studio.bench.phone_files import as_dual, write_shots
 from studio.bench.phone_random import OTHER, TUNED, random_phone
 from studio.bench.phone_response import FAMILIES, Curve
 from studio_core.capturing.settings import BACK, FRONT
-from studio_core.imaging.latlong import equirect_direction
+from studio_core.imaging.latlong import pixel_directions
 from studio_core.imaging.projection import Circle, Lens, project
 from studio_core.imaging.warping import moved_points
 
@@ -24,8 +24,7 @@ SMALL = Phone(size=(120, 100), circle=Circle(61.0, 49.0, 44.0))
 
 def room(height: int = 64) -> np.ndarray:
     """Smooth light that is different everywhere, (H, 2H, 3)."""
-    u, v = np.meshgrid((np.arange(2 * height) + 0.5) / (2 * height), (np.arange(height) + 0.5) / height)
-    d = equirect_direction(u, v)
+    d = pixel_directions(height, 2 * height)
     return (1 + 0.5 * d + 0.2 * d[..., [1, 2, 0]] ** 2).astype(np.float32)
 
 

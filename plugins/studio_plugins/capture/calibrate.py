@@ -26,7 +26,7 @@ from studio_core.capturing.settings import (
 from studio_core.colour import LUMINANCE as WEIGHTS
 from studio_core.colour import kelvin
 from studio_core.imaging.cubemap import faces_from_equirect
-from studio_core.imaging.latlong import equirect_direction, pixel_solid_angles
+from studio_core.imaging.latlong import equirect_direction, pixel_directions, pixel_solid_angles
 from studio_core.scene.geometry import Image
 from studio_plugins.capture.clipped import lacking, places
 
@@ -123,11 +123,9 @@ def _sums(
     normal = normal / length if length > 0 else np.array([0.0, 1.0, 0.0])
     angles = pixel_solid_angles(height, width)
     total, parts = 0.0, dict.fromkeys(masks, 0.0)
-    u = (np.arange(width) + 0.5) / width
     for start in range(0, height, _PARTS):
         rows = slice(start, min(start + _PARTS, height))
-        v = (np.arange(rows.start, rows.stop) + 0.5) / height
-        cosine = np.maximum(equirect_direction(u[None, :], v[:, None]) @ normal, 0) * angles[rows, None]
+        cosine = np.maximum(pixel_directions(height, width, rows) @ normal, 0) * angles[rows, None]
         caught = (light[rows] @ np.asarray(WEIGHTS, np.float32)) * cosine
         total += float(caught.sum())
         for name, mask in masks.items():
@@ -175,7 +173,7 @@ def _place(stitched: Stitched, light: F32, at: tuple[float, float], size: float)
     if not len(rows):
         rows = np.array([min(max(int(at[1] * height), 0), height - 1)])
     part = slice(int(rows[0]), int(rows[-1]) + 1)
-    directions = equirect_direction(((np.arange(width) + 0.5) / width)[None, :], v[part, None])
+    directions = pixel_directions(height, width, part)
     weight = (directions @ centre >= math.cos(radius)) * pixel_solid_angles(height, width)[part, None]
     if not weight.any():
         return "the picture is too small for it"

@@ -12,7 +12,7 @@ from studio_core.capturing.artifacts import F32, F64, Mask, Registration, Stitch
 from studio_core.capturing.settings import BACK, FEATHER, FRONT, StitchSettings
 from studio_core.capturing.standing import HALF_TURN, user_turn
 from studio_core.errors import InputError
-from studio_core.imaging.latlong import direction_to_uv, equirect_direction
+from studio_core.imaging.latlong import direction_to_uv, pixel_directions
 from studio_core.imaging.resample import resize_area
 from studio_core.imaging.sphere import with_border
 from studio_core.parallel import Workers
@@ -270,9 +270,7 @@ def _tile(
     made: _Composed, lenses: list[_Lens], joint: Joint | None, upright: F64, rows: slice, columns: slice
 ) -> None:
     height, width = made.unseen.shape
-    u = (np.arange(columns.start, columns.stop) + 0.5) / width
-    v = (np.arange(rows.start, rows.stop) + 0.5) / height
-    directions = equirect_direction(u[None, :], v[:, None]) @ upright  # the inverse of upright @ d
+    directions = pixel_directions(height, width, rows, columns) @ upright  # the inverse of upright @ d
     place = (rows, columns)
     front = lenses[0].look(directions)
     if joint is None:

@@ -23,7 +23,7 @@ from studio_core.capturing.settings import (
 )
 from studio_core.contract import Services
 from studio_core.errors import Cancelled, InputError
-from studio_core.imaging.latlong import pixel_solid_angles
+from studio_core.imaging.latlong import pixel_directions, pixel_solid_angles
 from studio_core.imaging.photograph import Photograph, ShotFacts
 from studio_core.imaging.projection import Circle
 from studio_core.parallel import Workers
@@ -67,10 +67,7 @@ def _irradiance_error(light: np.ndarray, truth: np.ndarray) -> float:
 
     truth = resize_area(truth, *light.shape[:2])
     height, width = light.shape[:2]
-    u, v = np.meshgrid((np.arange(width) + 0.5) / width, (np.arange(height) + 0.5) / height)
-    from studio_core.imaging.latlong import equirect_direction
-
-    d = equirect_direction(u, v) * 1.0
+    d = pixel_directions(height, width)
     area = pixel_solid_angles(height, width)[:, None]
     weights = [np.maximum(sign * d[..., axis], 0) * area for axis in range(3) for sign in (1, -1)]
     ours, theirs = ([float((w[..., None] * x).sum()) for w in weights] for x in (light, truth))

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from studio_core.imaging.latlong import equirect_direction
+from studio_core.imaging.latlong import pixel_directions
 from studio_core.registry import PluginHost
 from studio_core.scene.geometry import Geometry, Image, Texture
 from studio_core.scene.nodes import Camera, Environment, Group, Material, MeshObject, Scene
@@ -45,8 +45,7 @@ def quad() -> Geometry:
 def axes_environment(height: int = 32) -> Image:
     """Grey, with red around +x, green around +z, blue around +y, yellow around −z."""
     width = 2 * height
-    u, v = np.meshgrid((np.arange(width) + 0.5) / width, (np.arange(height) + 0.5) / height)
-    d = equirect_direction(u, v)
+    d = pixel_directions(height, width)
     pixels = np.full((height, width, 3), 0.1, np.float32)
     pixels[d[..., 0] > 0.9] = [5, 0, 0]
     pixels[d[..., 2] > 0.9] = [0, 4, 0]

@@ -10,7 +10,7 @@ import pytest
 from oracles.brdf import ORACLES, albedo, unit
 from oracles.primary import environment
 
-from studio_core.imaging.latlong import equirect_direction, pixel_solid_angles
+from studio_core.imaging.latlong import pixel_directions, pixel_solid_angles
 from studio_core.registry import PluginHost
 from studio_core.scene.geometry import Image
 from studio_core.scene.nodes import (
@@ -63,8 +63,7 @@ def test_a_coloured_sky_is_the_sum_over_its_pixels(host: PluginHost, parts: Any,
     sky = Environment(id="sky", image=image, azimuth=70.0, tilt=-30.0)
     made = irradiance(lit_by(sky), host, tmp_path, 1 << 14)
     height, width = 256, 512
-    u, v = np.meshgrid((np.arange(width) + 0.5) / width, (np.arange(height) + 0.5) / height)
-    d = equirect_direction(u, v).reshape(-1, 3)
+    d = pixel_directions(height, width).reshape(-1, 3)
     weight = np.repeat(pixel_solid_angles(height, width), width)
     radiance = environment(image.pixels.astype(float), 70.0, -30.0, d)
     wanted = (np.maximum(NORMALS @ d.T, 0) * weight) @ radiance

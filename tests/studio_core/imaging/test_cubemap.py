@@ -22,7 +22,7 @@ from studio_core.imaging.cubemap import (
 )
 from studio_core.imaging.decode import Limits, decode_file
 from studio_core.imaging.environment import load_environment
-from studio_core.imaging.latlong import equirect_direction
+from studio_core.imaging.latlong import equirect_direction, pixel_directions
 from studio_core.imaging.sphere import even_rows, with_border
 
 
@@ -34,8 +34,7 @@ def sky(directions: np.ndarray) -> np.ndarray:
 
 
 def picture(height: int) -> np.ndarray:
-    u, v = (np.arange(2 * height) + 0.5) / (2 * height), (np.arange(height) + 0.5) / height
-    return sky(equirect_direction(u[None, :], v[:, None]))
+    return sky(pixel_directions(height, 2 * height))
 
 
 def face_solid_angles(n: int) -> np.ndarray:

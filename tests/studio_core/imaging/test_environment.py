@@ -15,7 +15,12 @@ from studio_core.imaging.cubemap import equirect_from_cube, face_directions, fac
 from studio_core.imaging.encode import write_exr, write_png
 from studio_core.imaging.environment import BRIGHTEST, load_environment
 from studio_core.imaging.io import ImageDecoder
-from studio_core.imaging.latlong import direction_to_uv, equirect_direction, pixel_solid_angles
+from studio_core.imaging.latlong import (
+    direction_to_uv,
+    equirect_direction,
+    pixel_directions,
+    pixel_solid_angles,
+)
 
 N = 32
 
@@ -36,8 +41,7 @@ def sky(directions: np.ndarray) -> np.ndarray:
 
 
 def expected(height: int) -> np.ndarray:
-    u, v = (np.arange(2 * height) + 0.5) / (2 * height), (np.arange(height) + 0.5) / height
-    return sky(equirect_direction(u[None, :], v[:, None]))
+    return sky(pixel_directions(height, 2 * height))
 
 
 def opengl_faces(n: int = N) -> list[np.ndarray]:
@@ -57,6 +61,13 @@ def test_the_convention_is_openexrs() -> None:
 def test_directions_and_coordinates_are_inverse(u: float, v: float, length: float) -> None:
     back = direction_to_uv(length * equirect_direction(u, v))
     np.testing.assert_allclose(back, (u, v), atol=1e-9)
+
+
+def test_a_pixels_middle_is_its_direction() -> None:
+    whole = pixel_directions(3, 8)
+    assert whole.shape == (3, 8, 3)
+    np.testing.assert_allclose(whole[1, 5], equirect_direction(5.5 / 8, 0.5), atol=1e-12)
+    np.testing.assert_array_equal(pixel_directions(3, 8, slice(1, 3), slice(4, 6)), whole[1:3, 4:6])
 
 
 def test_solid_angles_cover_the_sphere() -> None:

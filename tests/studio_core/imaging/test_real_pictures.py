@@ -11,7 +11,7 @@ import pytest
 from studio_core.errors import InputError
 from studio_core.imaging.environment import load_environment
 from studio_core.imaging.io import ImageDecoder
-from studio_core.imaging.latlong import equirect_direction, pixel_solid_angles
+from studio_core.imaging.latlong import pixel_directions, pixel_solid_angles
 from studio_core.imaging.resample import resize_area
 
 
@@ -73,11 +73,8 @@ def test_poly_haven_maps_light_a_scene(shared_data: Path, decoder: ImageDecoder)
 
 def irradiance(pixels: np.ndarray, normals: np.ndarray) -> np.ndarray:
     height, width = pixels.shape[:2]
-    directions = equirect_direction(
-        (np.arange(width)[None, :] + 0.5) / width, (np.arange(height)[:, None] + 0.5) / height
-    )
     weighted = pixels * pixel_solid_angles(height, width)[:, None, None]
-    cosines = np.maximum(directions.reshape(-1, 3) @ normals.T, 0)
+    cosines = np.maximum(pixel_directions(height, width).reshape(-1, 3) @ normals.T, 0)
     made: np.ndarray = cosines.T @ weighted.reshape(-1, 3)
     return made
 
