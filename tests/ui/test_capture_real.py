@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 
 import numpy as np
@@ -17,13 +16,10 @@ from studio_core.scene.nodes import Environment
 from studio_plugins.brdfs import plugin as brdfs
 from studio_plugins.capture import plugin as capture
 
-MAPS = Path(os.environ.get("LUCARNE_TEST_DATA", "../shared/data")) / "cc0" / "hdri_polyhaven_cc0"
-
 
 @pytest.mark.slow
-@pytest.mark.skipif(not MAPS.is_dir(), reason="the shared HDR maps are not there")
-def test_a_room_from_photographs_to_the_scenes_light(make: Make, tmp_path: Path) -> None:
-    image, _ = load_environment(MAPS / "interior.exr")
+def test_a_room_from_photographs_to_the_scenes_light(make: Make, tmp_path: Path, shared_data: Path) -> None:
+    image, _ = load_environment(shared_data / "cc0/hdri_polyhaven_cc0/interior.exr")
     phone = Phone(
         size=(405, 330),
         circle=Circle(200.0, 165.0, 150.0),

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 from dataclasses import replace
 from pathlib import Path
 
@@ -22,8 +21,6 @@ from studio_core.shading.job import Job
 from studio_plugins.capture.falloff import from_loss
 from studio_plugins.capture.register import alone, register
 
-DATA = Path(os.environ.get("LUCARNE_TEST_DATA", "../shared/data"))
-INTERIOR = DATA / "cc0/hdri_polyhaven_cc0/interior.exr"
 PHONE = Phone(
     size=(460, 460),
     lens=Lens(fov=196),
@@ -94,10 +91,9 @@ def test_any_roll_of_the_back_shot(misalignment: tuple[float, float, float]) -> 
     assert apart(found.rotation, truth.rotation) < 0.3
 
 
-def test_a_map_of_a_real_room() -> None:
-    if not INTERIOR.is_file():
-        pytest.skip(f"no shared data at {DATA}")
-    truth = lens_light(load_environment(INTERIOR)[0].pixels, replace(PHONE, circle=Circle(228, 231, 210)), 1)
+def test_a_map_of_a_real_room(shared_data: Path) -> None:
+    room = load_environment(shared_data / "cc0/hdri_polyhaven_cc0/interior.exr")[0].pixels
+    truth = lens_light(room, replace(PHONE, circle=Circle(228, 231, 210)), 1)
     found = registered(truth)
     assert found.trusted
     assert apart(found.rotation, truth.rotation) < 0.3

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +14,6 @@ from studio_core.imaging.io import read_image
 from studio_core.imaging.ocam import read_ocam
 from studio_core.imaging.projection import EQUIDISTANT, Circle, Lens, pixel_points, project, unproject
 
-DATA = Path(os.environ.get("LUCARNE_TEST_DATA", "../shared/data"))
 SIZE = 600
 FLOAT = npt.NDArray[np.floating]
 
@@ -61,20 +59,15 @@ def bend(points: FLOAT) -> float:
     return 1.48 * float(np.median(np.abs(distance)))
 
 
-def ocam_view() -> View:
-    folder = DATA / "third_party/fisheye_ocamcalib_mit/ocamcamera"
-    if not folder.is_dir():
-        pytest.skip(f"no shared data at {DATA}")
+def ocam_view(data: Path) -> View:
+    folder = data / "third_party/fisheye_ocamcalib_mit/ocamcamera"
     lens, circle, _ = read_ocam(folder / "calib_results_0.txt")
     pixels = read_image(folder / "img0.jpg").pixels.astype(np.float32) / 255
     return View(pixels, np.ones(pixels.shape[:2], bool), circle, lens)
 
 
-def luminance_view() -> View:
-    path = DATA / "third_party/radiance_bsd/testimage.hdr"
-    if not path.is_file():
-        pytest.skip(f"no shared data at {DATA}")
-    pixels = read_image(path).pixels[..., :3]
+def luminance_view(data: Path) -> View:
+    pixels = read_image(data / "third_party/radiance_bsd/testimage.hdr").pixels[..., :3]
     pixels = np.ascontiguousarray(pixels / np.percentile(pixels, 90), np.float32)
     return View(pixels, np.ones(pixels.shape[:2], bool), Circle(393, 393, 393), Lens(EQUIDISTANT, 182))
 
@@ -91,8 +84,8 @@ EDGES = (  # along walls, doors and window frames, in cuts of 100° and 600 × 6
 
 
 @pytest.mark.parametrize(("real", "yaw", "first", "last"), EDGES)
-def test_straight_edges_of_real_photographs_become_straight(real, yaw, first, last) -> None:
-    view = real()
+def test_straight_edges_of_real_photographs_become_straight(real, yaw, first, last, shared_data) -> None:
+    view = real(shared_data)
     cut, _ = perspective(view, turned(yaw), 100, (SIZE, SIZE))
     points = trace(grey(cut), first, last)
     rays = camera_rays(100, SIZE, SIZE)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 
 import numpy as np
@@ -15,8 +14,6 @@ from studio_core.errors import InputError
 from studio_core.imaging.ocam import read_ocam
 from studio_core.imaging.projection import pixel_points, project, unproject
 
-DATA = Path(os.environ.get("LUCARNE_TEST_DATA", "../shared/data"))
-REAL = DATA / "third_party/fisheye_ocamcalib_mit/ocamcamera/calib_results_0.txt"
 GOOD = """# direct
 5 -240.0 0.0 1.4e-03 -7e-07 1.1e-09
 # inverse
@@ -36,11 +33,10 @@ def lines(path: Path) -> list[list[float]]:
     ]
 
 
-def test_a_real_lens_agrees_with_its_own_way_back() -> None:
-    if not REAL.is_file():
-        pytest.skip(f"no shared data at {DATA}")
-    lens, circle, size = read_ocam(REAL)
-    (_, *direct), (_, *inverse), centre, affine, _ = lines(REAL)
+def test_a_real_lens_agrees_with_its_own_way_back(shared_data: Path) -> None:
+    real = shared_data / "third_party/fisheye_ocamcalib_mit/ocamcamera/calib_results_0.txt"
+    lens, circle, size = read_ocam(real)
+    (_, *direct), (_, *inverse), centre, affine, _ = lines(real)
     assert size == (1600, 1600)
     assert 180 < lens.fov < 195
     points = pixel_points(1600, 1600)[::53, ::53].reshape(-1, 2)
