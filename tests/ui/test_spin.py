@@ -235,6 +235,21 @@ def test_a_held_key_is_one_gesture(qtbot: QtBot) -> None:
     assert heard.told[-1] == "commit"
 
 
+def test_a_held_key_is_a_step_each_where_no_gesture_may_begin(qtbot: QtBot) -> None:
+    class Busy(Heard):
+        def begin(self, name: str) -> bool:
+            return False
+
+    heard = Busy()
+    field = NumberField("width", LENGTH, heard)
+    shown(qtbot, field, NumberStyle("m", "."))
+    field.show_value(1.0)
+    for _ in range(2):
+        QTest.keyPress(field.spin, Qt.Key.Key_Up)
+    QTest.keyRelease(field.spin, Qt.Key.Key_Up)
+    assert heard.told == [("apply", pytest.approx(1.01)), ("apply", pytest.approx(1.02))]
+
+
 def test_a_drag_on_the_label_is_one_gesture(qtbot: QtBot) -> None:
     heard = Heard()
     field = NumberField("width", LENGTH, heard)

@@ -21,6 +21,7 @@ from PySide6.QtWidgets import (
 
 from studio_core.params import ParamInfo
 from studio_ui.forms.colour_button import ColourButton
+from studio_ui.forms.hold import Hold
 from studio_ui.forms.sinks import Sink
 from studio_ui.forms.spin import MIXED, Spin
 from studio_ui.look.theme import GAP
@@ -81,7 +82,7 @@ class NumberField(Field):
         self.spin = Spin(info)
         self.slider: Slider | None = None
         self._value = 0.0
-        self._gesture = False
+        self._hold = Hold(sink, name, self.spin)
         low, high = slider_range(info)
         self._low, self._high = low, high
         if high > low:
@@ -90,16 +91,13 @@ class NumberField(Field):
             self.slider.setMinimumWidth(30)
             self.slider.setFocusPolicy(Qt.FocusPolicy.NoFocus)
             self.slider.setAccessibleName(info.label)
-            self.slider.sliderPressed.connect(self._pressed)
-            self.slider.sliderReleased.connect(self._released)
+            self.slider.sliderPressed.connect(self._hold.begin)
+            self.slider.sliderReleased.connect(self._hold.end)
             self.slider.valueChanged.connect(self._slid)
             self.row.addWidget(self.slider, 1)
             self.spin.setFixedWidth(76)
         self.row.addWidget(self.spin, 0 if self.slider else 1)
         self.spin.valueChanged.connect(self._typed)
-        self.spin.held.connect(self._pressed)
-        self.spin.let_go.connect(self._released)
-        self.spin.dropped.connect(self._dropped)
 
     def make_slider(self) -> Slider:
         """The slider, where there is one."""
@@ -136,36 +134,17 @@ class NumberField(Field):
         value = min(max(value, self.info.low), self.info.high)
         return round(value) if self.info.kind == "integer" else value
 
-    def _pressed(self) -> None:
-        self._gesture = self.sink.begin(self.name)
-
     def _slid(self, step: int) -> None:
         value = self._at(step / _STEPS)
         self.spin.show_value(value)
-        if self._gesture:
-            self.sink.preview(self.name, value)
-        elif self.slider is not None and not self.slider.isSliderDown():
-            self.sink.apply(self.name, value)
-
-    def _released(self) -> None:
-        if self._gesture:
-            self._gesture = False
-            self.sink.commit()
-
-    def _dropped(self) -> None:
-        if self._gesture:
-            self._gesture = False
-            self.sink.cancel()
+        if self._hold.active or (self.slider is not None and not self.slider.isSliderDown()):
+            self._hold.give(value)
 
     def _typed(self, value: float) -> None:
         if abs(value - self._value) < 0.5 * 10.0 ** -self.spin.decimals():
             return  # only rounded
         self._value, self.spin.mixed = value, False
-        given = round(value) if self.info.kind == "integer" else value
-        if self._gesture:
-            self.sink.preview(self.name, given)
-        else:
-            self.sink.apply(self.name, given)
+        self._hold.give(round(value) if self.info.kind == "integer" else value)
 
 
 class FlagField(Field):

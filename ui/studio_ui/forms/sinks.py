@@ -35,10 +35,13 @@ class Sink(Protocol):
 
 
 class EditSink:
-    """Values become edits of a document: `make(name, value)`; a gesture on `name` is called `label(name)`."""
+    """Values become edits of a document: `make(name, value)`; a gesture on `name` is called `label(name)`.
+
+    What `make` has no edit for (None) changes nothing.
+    """
 
     def __init__(
-        self, editing: Editing, make: Callable[[str, Value], Edit], label: Callable[[str], str]
+        self, editing: Editing, make: Callable[[str, Value], Edit | None], label: Callable[[str], str]
     ) -> None:
         self._editing, self._make, self._label = editing, make, label
 
@@ -48,7 +51,9 @@ class EditSink:
 
     def preview(self, name: str, value: Value) -> None:
         """Show a value."""
-        self._editing.preview(self, self._make(name, value))
+        edit = self._make(name, value)
+        if edit is not None:
+            self._editing.preview(self, edit)
 
     def commit(self) -> None:
         """One history entry."""
@@ -60,7 +65,9 @@ class EditSink:
 
     def apply(self, name: str, value: Value) -> None:
         """One step."""
-        self._editing.apply(self._make(name, value))
+        edit = self._make(name, value)
+        if edit is not None:
+            self._editing.apply(edit)
 
 
 class PlainSink:

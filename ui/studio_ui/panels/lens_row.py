@@ -6,6 +6,7 @@ from PySide6.QtWidgets import QHBoxLayout, QWidget
 
 from studio_core.params import ParamInfo, param_infos
 from studio_core.scene.nodes import Camera
+from studio_ui.forms.hold import Hold
 from studio_ui.forms.sinks import Sink
 from studio_ui.forms.spin import ScrubLabel, Spin
 from studio_ui.look.theme import GAP
@@ -28,18 +29,14 @@ class LensRow(QWidget):
 
     def __init__(self, sink: Sink) -> None:
         super().__init__()
-        self._sink = sink
         self._fov = 0.0
-        self._gesture = False
         self.lens, self.angle = Spin(_LENS, decimals=1), Spin(_ANGLE, decimals=1)
+        self._hold = Hold(sink, "fov", self.lens, self.angle)
         layout = QHBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
         layout.setSpacing(GAP)
         for spin in (self.lens, self.angle):
             spin.setToolTip(spin.info.doc)
-            spin.held.connect(self._held)
-            spin.let_go.connect(self._let_go)
-            spin.dropped.connect(self._dropped)
         label = ScrubLabel("Lens", self.lens)
         label.setToolTip(_LENS.doc)
         layout.addWidget(label)
@@ -63,18 +60,4 @@ class LensRow(QWidget):
             self.angle.show_value(fov)
         else:
             self.lens.show_value(to_lens(fov))
-        give = self._sink.preview if self._gesture else self._sink.apply
-        give("fov", fov)
-
-    def _held(self) -> None:
-        self._gesture = self._sink.begin("fov")
-
-    def _let_go(self) -> None:
-        if self._gesture:
-            self._gesture = False
-            self._sink.commit()
-
-    def _dropped(self) -> None:
-        if self._gesture:
-            self._gesture = False
-            self._sink.cancel()
+        self._hold.give(fov)

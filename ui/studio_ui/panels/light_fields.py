@@ -14,6 +14,7 @@ from studio_core.colour import kelvin
 from studio_core.params import ParamInfo
 from studio_ui.forms.colour_button import to_display
 from studio_ui.forms.fields import Field, NumberField, Slider
+from studio_ui.forms.hold import Hold
 from studio_ui.forms.sinks import Sink
 from studio_ui.forms.spin import MIXED, Spin
 from studio_ui.look.theme import GAP
@@ -56,9 +57,7 @@ class _SecondLine(NumberField):
         self.other.setToolTip(self.other_info.doc)
         self.other.setAccessibleName(self.other_info.label)
         self.other.valueChanged.connect(self._other_typed)
-        self.other.held.connect(self._pressed)
-        self.other.let_go.connect(self._released)
-        self.other.dropped.connect(self._dropped)
+        self._hold.follow(self.other)
         self._other_value = math.inf
         line = QHBoxLayout()
         line.setSpacing(GAP)
@@ -98,8 +97,7 @@ class _SecondLine(NumberField):
             self.other.mixed = False
             self._other_value = value
             made = min(max(self.from_other(value), self.info.low), self.info.high)
-            give = self.sink.preview if self._gesture else self.sink.apply
-            give(self.name, float(f"{made:.6g}"))
+            self._hold.give(float(f"{made:.6g}"))
 
 
 class IntensityField(_SecondLine):
@@ -194,10 +192,7 @@ class DirectionField(Field):
         self.dial = Dial(info.label)
         self.spin = Spin(info, decimals=1)
         self._value = math.inf
-        self._gesture = False
-        self.spin.held.connect(self._pressed)
-        self.spin.let_go.connect(self._released)
-        self.spin.dropped.connect(self._dropped)
+        self._hold = Hold(sink, name, self.spin)
         self.dial.began = lambda: self.sink.begin(self.name)
         self.dial.turned = lambda degrees: self.sink.preview(self.name, degrees)
         self.dial.ended = self.sink.commit
@@ -220,24 +215,10 @@ class DirectionField(Field):
         self._value = math.inf
         self.spin.show_mixed(float(value))
 
-    def _pressed(self) -> None:
-        self._gesture = self.sink.begin(self.name)
-
-    def _released(self) -> None:
-        if self._gesture:
-            self._gesture = False
-            self.sink.commit()
-
-    def _dropped(self) -> None:
-        if self._gesture:
-            self._gesture = False
-            self.sink.cancel()
-
     def _typed(self, value: float) -> None:
         if abs(value - self._value) >= 1e-6:
             self._value, self.spin.mixed = value, False
-            give = self.sink.preview if self._gesture else self.sink.apply
-            give(self.name, value)
+            self._hold.give(value)
 
 
 def kelvin_colour(temperature: float) -> QColor:

@@ -10,16 +10,18 @@ from PySide6.QtGui import QShowEvent
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QWidget
 
 from studio_core.edits import Move
-from studio_core.params import ParamInfo
+from studio_core.params import ParamInfo, Value
 from studio_core.scene.nodes import Camera, Light, NodeId, Scene
 from studio_core.scene.size import own_size, pivot_words, resized
 from studio_core.scene.transform import IDENTITY, Transform, Vec3
 from studio_ui.canvas.drags import named
 from studio_ui.context import Context
 from studio_ui.forms.euler import from_euler, to_euler
+from studio_ui.forms.hold import Hold
 from studio_ui.forms.number_style import number_style
 from studio_ui.forms.param_form import form_label_like, form_layout
 from studio_ui.forms.reset_button import ResetButton, beside
+from studio_ui.forms.sinks import EditSink, Sink
 from studio_ui.forms.spin import Spin
 from studio_ui.panels.panel import note
 
@@ -48,14 +50,14 @@ _MOST = 20  # things that are measured; of more, the last ones
 
 
 class Triple(QWidget):
-    """Numbers of one kind side by side; keys that are held, and drags, are one gesture of `edits`."""
+    """Numbers of one kind side by side, each a parameter of its name for `sink`."""
 
-    def __init__(self, info: ParamInfo, edits: Edits, names: Sequence[str] = _AXES) -> None:
+    def __init__(self, info: ParamInfo, sink: Sink, names: Sequence[str] = _AXES) -> None:
         super().__init__()
         decimals = 2 if info.unit == "°" else 3
         self.spins = [Spin(info, decimals=decimals, show_unit=False) for _ in names]
         self._values: list[float] = [math.inf] * len(names)
-        self._edits = edits
+        self._holds = [Hold(sink, name, spin) for name, spin in zip(names, self.spins, strict=True)]
         layout = QHBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
         layout.setSpacing(3)
@@ -64,9 +66,6 @@ class Triple(QWidget):
             spin.setToolTip(f"{name.capitalize()}\n{info.doc}")
             spin.setAccessibleName(f"{info.label} {name}")
             spin.valueChanged.connect(lambda value, i=index: self._tell(i, value))
-            spin.held.connect(edits.hold)
-            spin.let_go.connect(edits.let_go)
-            spin.dropped.connect(edits.drop)
             layout.addWidget(spin, 1)
 
     def show_values(self, values: Sequence[float], mixed: Sequence[bool]) -> None:
@@ -79,7 +78,7 @@ class Triple(QWidget):
         if abs(value - self._values[index]) >= _ROUNDED:
             self.spins[index].mixed = False
             self._values[index] = value
-            self._edits.move(index, value)
+            self._holds[index].give(value)
 
 
 class UnitLabel(QLabel):
@@ -102,36 +101,6 @@ class UnitLabel(QLabel):
         self.follow_style()
 
 
-class Edits:
-    """What the numbers of one row do: `moved(transform, node, index, value)` is a thing's new transform."""
-
-    def __init__(self, editor: PlaceEditor, verb: str, moved: Moved) -> None:
-        self._editor, self._verb, self._moved = editor, verb, moved
-        self._gesture = False
-
-    def hold(self) -> None:
-        """What follows is one step."""
-        self._gesture = self._editor.context.editing.begin(self, self._editor.label(self._verb))
-
-    def let_go(self) -> None:
-        """That was it."""
-        self._gesture = False
-        self._editor.context.editing.commit(self)
-
-    def drop(self) -> None:
-        """Back to how it was."""
-        self._gesture = False
-        self._editor.context.editing.cancel(self)
-
-    def move(self, index: int, value: float) -> None:
-        """A number was typed, or goes by while it is held."""
-        edit = self._editor.edit(self._verb, lambda old, node: self._moved(old, node, index, value))
-        if edit is not None and self._gesture:
-            self._editor.context.editing.preview(self, edit)
-        elif edit is not None:
-            self._editor.context.editing.apply(edit)
-
-
 class PlaceEditor(QWidget):
     """Position, rotation, scale and size of what is chosen; an edit of all of it is one step."""
 
@@ -139,10 +108,10 @@ class PlaceEditor(QWidget):
         super().__init__()
         self.context = context
         self._nodes: tuple[NodeId, ...] = ()
-        self.position = Triple(_POSITION, Edits(self, "Move", _shifted))
-        self.rotation = Triple(_ANGLE, Edits(self, "Turn", _turned))
-        self.scale = Triple(_SCALE, Edits(self, "Scale", _scaled), ("scale",))
-        self.size = Triple(_SIZE, Edits(self, "Resize", self._sized), _SIDES)
+        self.position = self._triple(_POSITION, "Move", _shifted)
+        self.rotation = self._triple(_ANGLE, "Turn", _turned)
+        self.scale = self._triple(_SCALE, "Scale", _scaled, ("scale",))
+        self.size = self._triple(_SIZE, "Resize", self._sized, _SIDES)
         resets = {
             "translation": ResetButton("position", lambda: self._reset("translation", "Move")),
             "rotation": ResetButton("rotation", lambda: self._reset("rotation", "Turn")),
@@ -186,15 +155,23 @@ class PlaceEditor(QWidget):
 
     # edits
 
-    def label(self, verb: str) -> str:
+    def _triple(self, info: ParamInfo, verb: str, moved: Moved, names: Sequence[str] = _AXES) -> Triple:
+        """Numbers that make a thing's new transform by `moved(transform, node, index, value)`."""
+
+        def edit(name: str, value: Value) -> Move | None:
+            return self._edit(verb, lambda old, node: moved(old, node, names.index(name), value))
+
+        return Triple(info, EditSink(self.context.editing, edit, lambda _: self._label(verb)), names)
+
+    def _label(self, verb: str) -> str:
         """What the history calls an edit of what is chosen."""
         return named(self.context.document.scene, self._there(), verb)
 
-    def edit(self, verb: str, moved: Callable[[Transform, NodeId], Transform]) -> Move | None:
+    def _edit(self, verb: str, moved: Callable[[Transform, NodeId], Transform]) -> Move | None:
         """The edit that gives all of them another transform; None when nothing is left of them."""
         scene, nodes = self.context.document.scene, self._there()
         made = {node: moved(scene[node].transform, node) for node in nodes}
-        return Move(made, self.label(verb)) if made else None
+        return Move(made, self._label(verb)) if made else None
 
     def _there(self) -> tuple[NodeId, ...]:
         scene = self.context.document.scene
@@ -207,7 +184,7 @@ class PlaceEditor(QWidget):
 
     def _reset(self, name: str, verb: str) -> None:
         fields = {name: getattr(IDENTITY, name)}
-        edit = self.edit(verb, lambda old, _: dataclasses.replace(old, **fields))
+        edit = self._edit(verb, lambda old, _: dataclasses.replace(old, **fields))
         if edit is not None:
             self.context.editing.apply(edit)
 
