@@ -7,7 +7,7 @@ import shutil
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Generic, TypeVar
 
 from studio_core.contract import Exporter, ImportedModel, Importer, Registry
 from studio_core.edits import Add
@@ -15,13 +15,12 @@ from studio_core.errors import Cancelled, InputError, LucarneError, PluginError
 from studio_core.scene.nodes import Scene
 
 Report = Callable[[str, BaseException], object]
+_Format = TypeVar("_Format", Importer, Exporter)
 
 
 @dataclass(frozen=True)
-class GuardedImporter:
-    """An importer whose models are looked at before anybody uses them."""
-
-    inner: Importer
+class _Guarded(Generic[_Format]):
+    inner: _Format
     plugin: str
     report: Report
 
@@ -34,6 +33,11 @@ class GuardedImporter:
     def extensions(self) -> tuple[str, ...]:
         """As the plugin says."""
         return tuple(self.inner.extensions)
+
+
+@dataclass(frozen=True)
+class GuardedImporter(_Guarded[Importer]):
+    """An importer whose models are looked at before anybody uses them."""
 
     def load(self, path: Path, unit: float = 1.0) -> ImportedModel:
         """See `Importer`; PluginError when it fails otherwise than it should, or gives what is no model."""
@@ -49,22 +53,8 @@ class GuardedImporter:
 
 
 @dataclass(frozen=True)
-class GuardedExporter:
+class GuardedExporter(_Guarded[Exporter]):
     """An exporter that writes beside its target first: what was there stays when it fails."""
-
-    inner: Exporter
-    plugin: str
-    report: Report
-
-    @property
-    def label(self) -> str:
-        """As the plugin says."""
-        return str(self.inner.label)
-
-    @property
-    def extensions(self) -> tuple[str, ...]:
-        """As the plugin says."""
-        return tuple(self.inner.extensions)
 
     def save(self, scene: Scene, path: Path, registry: Registry) -> tuple[str, ...]:
         """See `Exporter`; PluginError when it fails, and then nothing was written."""
