@@ -10,6 +10,7 @@ import sys
 import threading
 from pathlib import Path
 
+import numpy as np
 import pytest
 from PySide6.QtCore import QEvent
 from PySide6.QtGui import QKeySequence
@@ -18,6 +19,9 @@ from pytestqt.qtbot import QtBot
 from ui_support import Driver, Make, room
 
 from studio_core.document import Document
+from studio_core.edits import Add, SetFields
+from studio_core.scene.geometry import Image
+from studio_core.scene.nodes import Environment
 from studio_ui.actions.catalogue import ACTIONS, specs
 from studio_ui.dialogs import KeysDialog
 from studio_ui.feed import REST_MS
@@ -186,6 +190,23 @@ def test_help_and_lists_open(driver: Driver) -> None:
     driver.do("view.new_camera")
     assert camera_menu(driver) == ["Camera"]
     assert driver.window.view_controls.camera.currentText() == "Camera"
+
+
+def test_only_turning_the_light_ticks_off_the_hint_of_it(driver: Driver) -> None:
+    def ticked() -> bool:
+        return driver.window.hints._labels[1].text().startswith("✓")
+
+    def light(level: float) -> Image:
+        return Image(np.full((8, 16, 3), level, np.float32))
+
+    document = driver.document
+    document.apply(Add((Environment(id="sky", image=light(1)),)))
+    document.apply(SetFields("sky", {"image": light(2), "luminance_scale": 50.0}))  # as a capture does
+    assert not ticked()
+    document.apply(SetFields("sky", {"image": light(3), "azimuth": 0.0}))
+    assert not ticked()
+    document.apply(SetFields("sky", {"azimuth": 30.0}))
+    assert ticked()
 
 
 def test_hints_are_ticked_off_and_never_come_again(make: Make, tmp_path: Path) -> None:

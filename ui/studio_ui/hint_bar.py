@@ -8,20 +8,38 @@ from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QSizePolicy, QToolButton
 
 from studio_core.scene.diff import Aspect, Changes
-from studio_core.scene.nodes import Scene
+from studio_core.scene.nodes import Environment, Scene
 from studio_ui.context import Context, Subscriptions
 from studio_ui.look.fitting import show_what_fits
 from studio_ui.look.icons import icon
 from studio_ui.look.theme import Theme
 from studio_ui.settings import Settings
 
-STEPS = (
-    (Aspect.TRANSFORM, "Click furniture, then drag it"),
-    (Aspect.LIGHT, "Shift+right-drag turns the light"),
-    (Aspect.MATERIAL, "Change a colour under Materials"),
+Test = Callable[[Scene, Scene, Changes], bool]
+
+
+def _moved(before: Scene, after: Scene, changes: Changes) -> bool:
+    return bool(changes.aspects & Aspect.TRANSFORM)
+
+
+def _light_turned(before: Scene, after: Scene, changes: Changes) -> bool:
+    """A capture, or another picture, also changes the light."""
+    pairs = ((before.nodes.get(light.id), light) for light in after.of(Environment))
+    return any(
+        isinstance(old, Environment) and old.image is new.image and old.azimuth != new.azimuth
+        for old, new in pairs
+    )
+
+
+def _repainted(before: Scene, after: Scene, changes: Changes) -> bool:
+    return bool(changes.aspects & Aspect.MATERIAL)
+
+
+STEPS: tuple[tuple[Test, str], ...] = (
+    (_moved, "Click furniture, then drag it"),
+    (_light_turned, "Shift+right-drag turns the light"),
+    (_repainted, "Change a colour under Materials"),
 )
-
-
 _HEIGHT, _MARGIN, _GAP = 32, 10, 22
 
 
@@ -34,7 +52,7 @@ class HintBar(QFrame):
         self.setFixedHeight(_HEIGHT)
         self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)  # a text resizes no picture
         self._settings, self._document = settings, context.document
-        self._done: set[Aspect] = set()
+        self._done: set[int] = set()
         self._labels = [QLabel() for _ in STEPS]
         layout = QHBoxLayout(self)
         layout.setContentsMargins(_MARGIN, 3, _MARGIN, 3)
@@ -90,7 +108,7 @@ class HintBar(QFrame):
             self.setVisible(self._wanted())
         if not before.nodes or changes.aspects & Aspect.STRUCTURE:
             return  # another project, or something new in this one
-        done = {aspect for aspect, _ in STEPS if changes.aspects & aspect}
+        done = {index for index, (test, _) in enumerate(STEPS) if test(before, after, changes)}
         if done - self._done:
             self._done |= done
             self._write()
@@ -103,15 +121,15 @@ class HintBar(QFrame):
         self._fit()
 
     def _fit(self) -> None:
-        done = [aspect in self._done for aspect, _ in STEPS]
-        order = sorted(range(len(STEPS)), key=lambda i: done[i])
+        order = sorted(range(len(STEPS)), key=lambda i: i in self._done)
         room = self.width() - self._close.sizeHint().width() - 2 * _MARGIN
         show_what_fits(room, [self._labels[i] for i in order], _GAP)
 
     def _write(self) -> None:
-        for number, (label, (aspect, text)) in enumerate(zip(self._labels, STEPS, strict=True), 1):
-            label.setText(f"✓  {text}" if aspect in self._done else f"{number}  {text}")
-            label.setProperty("role", "dim" if aspect in self._done else "")
+        for index, (label, (_, text)) in enumerate(zip(self._labels, STEPS, strict=True)):
+            done = index in self._done
+            label.setText(f"✓  {text}" if done else f"{index + 1}  {text}")
+            label.setProperty("role", "dim" if done else "")
             label.style().unpolish(label)
             label.style().polish(label)
         self._fit()
