@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from studio_core.capturing.artifacts import F32, F64, Mask, View
 from studio_core.imaging.projection import project
-from studio_core.imaging.resample import resize_area
+from studio_core.imaging.resample import known_means
 
 _COARSER = 1.5
 
@@ -62,9 +62,7 @@ def perspective(
     if coarse > _COARSER:
         old_height, old_width = view.light.shape[:2]
         new = max(1, round(old_height / coarse)), max(1, round(old_width / coarse))
-        shown = np.where(view.usable[..., None], view.light, np.float32(0))
-        share = resize_area(view.usable[..., None].astype(np.float32), *new)
-        light = resize_area(shown, *new) / np.maximum(share, 1e-6)
+        light, share = known_means(view.light, view.usable, *new)
         factor = new[1] / old_width
-        view = View(np.asarray(light, np.float32), share[..., 0] > 0.5, view.circle.scaled(factor), view.lens)
+        view = View(light, share > 0.5, view.circle.scaled(factor), view.lens)
     return look(view, rays)

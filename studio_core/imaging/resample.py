@@ -33,6 +33,18 @@ def resize_area(pixels: npt.NDArray[Any], height: int, width: int) -> npt.NDArra
     return bytes_
 
 
+def known_means(
+    pixels: npt.NDArray[np.float32], known: npt.NDArray[np.bool_], height: int, width: int
+) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.float32]]:
+    """Means (height, width, C) over what is `known` (H, W) of each new pixel's area, and its share.
+
+    The share is (height, width); where it is 0, so is the mean.
+    """
+    share = resize_area(known[..., None].astype(np.float32), height, width)
+    total = resize_area(np.where(known[..., None], pixels, np.float32(0)), height, width)
+    return np.asarray(total / np.maximum(share, 1e-6), np.float32), share[..., 0]
+
+
 def thumbnail_size(height: int, width: int, longest: int) -> tuple[int, int]:
     """Height and width that fit into a square of `longest` pixels, never enlarged."""
     factor = min(1.0, longest / max(height, width))

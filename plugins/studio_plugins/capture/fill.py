@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from studio_core.capturing.artifacts import F32, Mask
-from studio_core.imaging.resample import resize_area
+from studio_core.imaging.resample import known_means, resize_area
 from studio_core.imaging.sphere import even_rows, with_border
 
 _FINEST = 1024
@@ -27,12 +27,10 @@ def fill(light: F32, unseen: Mask) -> None:
 
     height, width = unseen.shape
     rows = min(height, _FINEST // 2)
-    share = resize_area((~unseen)[..., None].astype(np.float32), rows, 2 * rows)
-    known = resize_area(np.where(unseen[..., None], np.float32(0), light), rows, 2 * rows)
-    known = known / np.maximum(share, 1e-6)
-    grey = known.mean(axis=2)[share[..., 0] > 0]
+    known, share = known_means(light, ~unseen, rows, 2 * rows)
+    grey = known.mean(axis=2)[share > 0]
     floor = 1e-4 * float(grey.mean()) + 1e-12
-    values = _pull_push(np.log(known + floor).astype(np.float32), share)
+    values = _pull_push(np.log(known + floor).astype(np.float32), share[..., None])
     guess = even_rows(np.exp(values) - np.float32(floor), 2 * np.pi / rows)
     np.maximum(guess, 0, out=guess)
     if rows != height:

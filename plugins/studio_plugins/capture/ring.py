@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from studio_core.capturing.artifacts import F32, F64, Mask, View
+from studio_core.imaging.resample import known_means
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,17 +47,12 @@ def coarser(view: View, radius: float) -> View:
 
     Light is averaged over what is usable; a pixel is usable where half of its area is.
     """
-    import cv2
-
     factor = int(view.circle.radius / radius)
     if factor < 2:
         return view
     height, width = (size // factor for size in view.usable.shape)
     part = (slice(0, height * factor), slice(0, width * factor))
-    usable = view.usable[part].astype(np.float32)
-    share = cv2.resize(usable, (width, height), interpolation=cv2.INTER_AREA)
-    total = cv2.resize(view.light[part] * usable[:, :, None], (width, height), interpolation=cv2.INTER_AREA)
-    light = np.asarray(total / np.maximum(share, 1e-6)[:, :, None], np.float32)
+    light, share = known_means(view.light[part], view.usable[part], height, width)
     circle = view.circle.scaled(1 / factor)
     return replace(view, light=light, usable=share >= 0.5, circle=circle, clipped=None, dark=None)
 

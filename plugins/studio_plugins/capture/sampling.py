@@ -17,7 +17,7 @@ import numpy.typing as npt
 
 from studio_core.capturing.artifacts import F32, F64, Mask, View
 from studio_core.imaging.projection import project
-from studio_core.imaging.resample import resize_area
+from studio_core.imaging.resample import known_means, resize_area
 
 COARSE = 1.2
 """Pixels of the source a new pixel covers, from which on it is their mean."""
@@ -59,10 +59,8 @@ def lens_source(view: View, pitch: float) -> Source:
         factor = _MOST / 1.5 / coarse
         height, width = light.shape[:2]
         size = max(2, round(height * factor)), max(2, round(width * factor))
-        share = resize_area(usable[..., None].astype(np.float32), *size)
-        mean = resize_area(np.where(usable[..., None], light, np.float32(0)), *size)
-        light = _carried_out(np.asarray(mean / np.maximum(share, 1e-6), np.float32), share[..., 0] > 0)
-        usable = share[..., 0] > 0.5
+        light, share = known_means(light, usable, *size)
+        light, usable = _carried_out(light, share > 0), share > 0.5
         clipped, dark = _shrunk(clipped, size, 0.2), _shrunk(dark, size, 0.5)
         circle = circle.scaled(size[1] / width)
         coarse *= size[1] / width

@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from studio_core.imaging.resample import resize_area, thumbnail_size
+from studio_core.imaging.resample import known_means, resize_area, thumbnail_size
 from studio_core.imaging.transfer import linear_to_srgb, srgb_to_linear
 
 
@@ -20,6 +20,20 @@ def test_whole_factors_are_block_means(rows: int, columns: int, fy: int, fx: int
 def test_any_shrinking_keeps_the_mean() -> None:
     pixels = np.random.default_rng(1).random((31, 45, 3)).astype(np.float32)
     np.testing.assert_allclose(resize_area(pixels, 7, 11).mean(), pixels.mean(), rtol=1e-4)
+
+
+def test_means_over_what_is_known() -> None:
+    pixels = np.random.default_rng(2).random((12, 20, 3)).astype(np.float32)
+    known = np.random.default_rng(3).random((12, 20)) > 0.6
+    known[:4, :5] = False
+    pixels[~known] = np.nan
+    means, share = known_means(pixels, known, 3, 4)
+    for row in range(3):
+        for column in range(4):
+            block = np.s_[4 * row : 4 * row + 4, 5 * column : 5 * column + 5]
+            there = pixels[block][known[block]]
+            np.testing.assert_allclose(share[row, column], len(there) / 20, rtol=1e-5)
+            np.testing.assert_allclose(means[row, column], there.mean(axis=0) if len(there) else 0, rtol=1e-4)
 
 
 def test_bytes_are_averaged_as_light() -> None:
