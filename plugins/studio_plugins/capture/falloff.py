@@ -16,10 +16,9 @@ from typing import Any
 import numpy as np
 
 from studio_core.capturing.artifacts import F64, light_at
-from studio_plugins.capture.overlap import Stand, Strip, across, padded, ways
+from studio_plugins.capture.overlap import EDGE, Stand, Strip, across, padded, ways
 
 _BINS, _SECTORS = 24, 12
-_EDGE = 0.985  # of θ_max: further out the circle's soft border begins
 _SHAPE = (0.32, 0.1)
 _SHAPE_SPREAD = (0.2, 0.1)
 _ROUGH = 0.006  # what a bin's median may be wrong by beyond its noise, in ln
@@ -142,7 +141,7 @@ def _ratios(front: Strip, back: Strip, stand: Stand) -> tuple[F64, F64, F64, F64
     s_front = np.arccos(np.clip(-ways(front, at, stand)[..., 2], -1, 1)) / half
     turned = ways(back, there, stand)
     s_back = np.arccos(np.clip(turned[..., 2], -1, 1)) / half
-    both = front.resolved & (np.asarray(usable) > 0.99) & (s_front < _EDGE) & (s_back < _EDGE)
+    both = front.resolved & (np.asarray(usable) > 0.99) & (s_front < EDGE) & (s_back < EDGE)
     empty = np.zeros((0, 3)), np.zeros(0), np.zeros(0), np.zeros((0, 1))
     if both.sum() < 100:
         return empty

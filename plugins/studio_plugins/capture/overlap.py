@@ -18,6 +18,8 @@ from studio_core.capturing.standing import HALF_TURN
 from studio_core.colour import LUMINANCE
 from studio_core.imaging.projection import Circle, Lens, project
 
+EDGE = 0.985
+"""Of θ_max: further out the circle's soft border begins, which both lenses have at different places."""
 _FINER = 1.5
 _FLOOR = 1e-4
 
@@ -99,7 +101,7 @@ NOTHING = Patches(np.zeros((0, 2)), np.zeros((0, 2)), np.zeros((0, 2, 2)), np.ze
 def unroll(view: View, turned: bool, inner: float, per_degree: float) -> Strip:
     """A lens' rim from the angle `inner` (radians from its axis) to its edge, `per_degree` pixels a degree.
 
-    Light is averaged where the photograph is finer.
+    Light is averaged where the photograph is finer. Beyond `EDGE` nothing is usable.
     """
     import cv2
 
@@ -121,6 +123,8 @@ def unroll(view: View, turned: bool, inner: float, per_degree: float) -> Strip:
     some = luminance[there]
     floor = max(_FLOOR * float(np.median(some)), 1e-20) if some.size else 1.0
     there &= luminance > floor
+    theta = math.pi - places[..., 1] if turned else places[..., 1]
+    there &= theta < EDGE * view.lens.half
     tone = np.log2(np.maximum(luminance, floor)).astype(np.float32)
     channels = np.log2(np.maximum(made, floor)).astype(np.float32)
     return Strip(tone, channels, there, there & sure, first, step, turned, view.lens, view.circle)

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from studio.bench.phone import Arc, Phone, Truth, lens_light
-from studio_core.capturing.artifacts import F32, F64, View
+from studio_core.capturing.artifacts import F32, F64, Mask, View
 from studio_core.capturing.settings import LensSettings, RegistrationSettings
 from studio_core.capturing.standing import rotation_from
 from studio_core.errors import Cancelled
@@ -58,6 +58,12 @@ def views(truth: Truth, lens: Lens = GUESS) -> tuple[View, View]:
     return made[0], made[1]
 
 
+def within(view: View) -> Mask:
+    """The circle with its soft border."""
+    y, x = np.mgrid[0 : view.light.shape[0], 0 : view.light.shape[1]] + 0.5
+    return np.asarray(np.hypot(x - view.circle.x, y - view.circle.y) < view.circle.radius)
+
+
 def apart(a: F64, b: F64) -> float:
     return math.degrees(math.acos(min(1.0, max(-1.0, (np.trace(a.T @ b) - 1) / 2))))
 
@@ -98,6 +104,18 @@ def test_a_map_of_a_real_room(shared_data: Path) -> None:
     assert found.trusted
     assert apart(found.rotation, truth.rotation) < 0.3
     assert found.lens.fov == pytest.approx(196, rel=0.005)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_smooth_sky_and_soft_borders_do_not_hold_it_where_it_starts(seed: int) -> None:
+    light = room(seed)
+    light[:128] = np.linspace(4, 1, 128, dtype=np.float32)[:, None, None]
+    phone = replace(PHONE, lens=Lens(fov=191), edge=0.015, tilt=(0.0, 20.0, 0.0))
+    truth = lens_light(light, phone, 1)
+    front, back = (replace(v, usable=within(v)) for v in views(truth, Lens(fov=190)))
+    found = register(front, back, RegistrationSettings(), LensSettings(), Job("test"))
+    assert found.trusted
+    assert apart(found.rotation, truth.rotation) < 0.25
 
 
 def test_reflections_of_the_frame_do_not_lead_astray() -> None:
