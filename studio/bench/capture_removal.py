@@ -215,8 +215,7 @@ def told(patch: Patch) -> str:
 
 
 def _inside(view: View, patch: Patch) -> npt.NDArray[np.bool_]:
-    from studio_plugins.capture.removal import covers
-    from studio_plugins.capture.ring import angles
+    from studio_plugins.capture.ring import angles, covers
 
     way, _ = unproject(view.lens, view.circle, pixel_points(*view.usable.shape))
     azimuth, theta = angles(way)

@@ -175,11 +175,12 @@ class _Pass:
             self._tell(registration=registration, notes=registration.notes)
         self._reached("registration")
 
-        def clean(job: Job) -> Reflections:
+        def clean(job: Job) -> tuple[Reflections, Registration | None]:
             return _without_reflections(views, registration, wanted, job)
 
-        reflections = self._stage("reflections", (views, registration, wanted.reflections), clean)
-        self._tell(reflections=reflections, notes=reflections.notes)
+        inputs = (views, registration, wanted.reflections, wanted.lens)
+        reflections, registration = self._stage("reflections", inputs, clean)
+        self._tell(reflections=reflections, registration=registration, notes=reflections.notes)
         self._reached("reflections")
 
         workers, clean_views = self._services.workers, _clean(views, reflections)
@@ -368,12 +369,14 @@ def _registered(views: Mapping[str, View], settings: CaptureSettings, job: Job) 
 
 def _without_reflections(
     views: Mapping[str, View], registration: Registration | None, settings: CaptureSettings, job: Job
-) -> Reflections:
+) -> tuple[Reflections, Registration | None]:
+    """Light without them, and the registration whose brightness they do not disturb."""
     from studio_plugins.capture.reflections import find_reflections
+    from studio_plugins.capture.register import rebalanced
     from studio_plugins.capture.removal import remove
 
     if registration is None:
-        return Reflections((), frozen_map({side: view.light for side, view in views.items()}))
+        return Reflections((), frozen_map({side: view.light for side, view in views.items()})), None
     chosen = settings.reflections
     moved: dict[str, Circle | None] = {FRONT: registration.front, BACK: registration.back}
     through = {
@@ -384,7 +387,8 @@ def _without_reflections(
     if patches is None:
         half = StageJob(job, 0.0, 0.5)
         patches = find_reflections(through[FRONT], through.get(BACK), registration, chosen, half)
-    return remove(through, registration, patches, StageJob(job, 0.5, 0.5))
+    registration = rebalanced(registration, through, patches, settings.lens)
+    return remove(through, registration, patches, StageJob(job, 0.5, 0.5)), registration
 
 
 def _clean(views: Mapping[str, View], reflections: Reflections) -> dict[str, View]:

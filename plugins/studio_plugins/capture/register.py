@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from studio_core.capturing.artifacts import F64, Registration, View
-from studio_core.capturing.settings import LensSettings, RegistrationSettings
+from studio_core.capturing.settings import BACK, FRONT, LensSettings, Patch, RegistrationSettings
 from studio_core.capturing.standing import rotation_from
 from studio_core.imaging.projection import OCAM, ORTHOGRAPHIC, Circle, Lens
 from studio_core.shading.job import Job
@@ -15,6 +17,7 @@ from studio_plugins.capture.falloff import NO_RIM, Balance, balanced, from_loss
 from studio_plugins.capture.guesses import by_features, by_rolling, by_sliding
 from studio_plugins.capture.overlap import Stand, Strip, rotation_of, stand_of, unroll
 from studio_plugins.capture.refine import BLURS, refined
+from studio_plugins.capture.ring import covers
 from studio_plugins.capture.solve import Fit, solved
 
 _FINEST = 5.0  # pixels a degree of the strips
@@ -189,6 +192,39 @@ def _as_set(
     gain, falloff, rim = _balance(found, settings, lens, notes)
     trusted = not settings.automatic
     return Registration(rotation_of(stand), front.lens, gain, falloff, 0.0, 0, trusted, tuple(notes), rim=rim)
+
+
+def rebalanced(
+    found: Registration, views: Mapping[str, View], patches: Sequence[Patch], lens: LensSettings
+) -> Registration:
+    """The registration with gain and falloff of what no reflection of the frame covers.
+
+    views: with the registration's lens and circles. Where too little is left of what both lenses see, and
+    without a registration to trust, it stays as it is.
+    """
+    used = [patch for patch in patches if patch.used]
+    if not used or not found.trusted or len(views) < 2:
+        return found
+    strips = _strips(views[FRONT], views[BACK])
+    free = [
+        _without(strip, [patch for patch in used if patch.side == side])
+        for strip, side in zip(strips, (FRONT, BACK), strict=True)
+    ]
+    made = balanced(free[0], free[1], stand_of(found.rotation, found.lens), lens.falloff)
+    if made is None or made.off > _UNLIKE:
+        return found
+    return replace(found, gain=made.gain, falloff=made.falloff, rim=made.rim)
+
+
+def _without(strip: Strip, patches: Sequence[Patch]) -> Strip:
+    """A strip in which rectangles tell nothing of how bright it is."""
+    azimuth, theta = np.moveaxis(strip.grid(), -1, 0)
+    if strip.turned:
+        azimuth, theta = math.pi - azimuth, math.pi - theta
+    free = strip.resolved.copy()
+    for patch in patches:
+        free &= ~covers(patch, azimuth, theta)
+    return replace(strip, resolved=free)
 
 
 def alone(view: View, lens: LensSettings) -> Registration:

@@ -21,7 +21,7 @@ from studio_core.imaging.poisson import membrane
 from studio_core.imaging.projection import unproject
 from studio_core.shading.job import Job
 from studio_plugins.capture.compare import EDGE, Comparison, compare, falloff_at, towards
-from studio_plugins.capture.ring import angles, coarser, directions
+from studio_plugins.capture.ring import angles, coarser, covers, directions
 
 _FLOOR = 1e-4  # of the median light
 _ODD = math.log(4.0)  # a border that is further off than this from the others is something else
@@ -89,13 +89,6 @@ def remove(
         made.append(patch)
     job.checkpoint(len(patches), len(patches))
     return Reflections(tuple(made), lights, tuple(notes))
-
-
-def covers(patch: Patch, azimuth: F64, theta: F64) -> Mask:
-    """Which directions (radians) a rectangle holds."""
-    along = np.mod(np.degrees(azimuth) - patch.azimuth, 360.0)
-    away = np.degrees(theta)
-    return np.asarray((along <= patch.width) & (away >= patch.inner) & (away <= patch.outer), np.bool_)
 
 
 def clean_azimuth(own: View, patch: Patch, patches: Sequence[Patch]) -> float | None:

@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from studio_core.capturing.artifacts import F32, F64, Mask, View
+from studio_core.capturing.settings import Patch
 from studio_core.imaging.resample import known_means
 
 
@@ -40,6 +41,13 @@ def angles(way: F64) -> tuple[F64, F64]:
     """Azimuth 0 … 2π and angle from the axis of unit directions (..., 3)."""
     azimuth = np.mod(np.arctan2(way[..., 1], way[..., 0]), 2 * np.pi)
     return azimuth, np.arctan2(np.hypot(way[..., 0], way[..., 1]), -way[..., 2])
+
+
+def covers(patch: Patch, azimuth: F64, theta: F64) -> Mask:
+    """Which directions (radians) a rectangle holds."""
+    along = np.mod(np.degrees(azimuth) - patch.azimuth, 360.0)
+    away = np.degrees(theta)
+    return np.asarray((along <= patch.width) & (away >= patch.inner) & (away <= patch.outer), np.bool_)
 
 
 def coarser(view: View, radius: float) -> View:

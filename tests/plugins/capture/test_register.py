@@ -11,15 +11,15 @@ import numpy as np
 import pytest
 
 from studio.bench.phone import Arc, Phone, Truth, lens_light
-from studio_core.capturing.artifacts import F32, F64, Mask, View
-from studio_core.capturing.settings import LensSettings, RegistrationSettings
+from studio_core.capturing.artifacts import F32, F64, Mask, Registration, View
+from studio_core.capturing.settings import LensSettings, Patch, RegistrationSettings
 from studio_core.capturing.standing import rotation_from
 from studio_core.errors import Cancelled
 from studio_core.imaging.environment import load_environment
 from studio_core.imaging.projection import KANNALA_BRANDT, ORTHOGRAPHIC, Circle, Lens
 from studio_core.shading.job import Job
 from studio_plugins.capture.falloff import from_loss
-from studio_plugins.capture.register import alone, register
+from studio_plugins.capture.register import alone, rebalanced, register
 
 PHONE = Phone(
     size=(460, 460),
@@ -125,6 +125,32 @@ def test_reflections_of_the_frame_do_not_lead_astray() -> None:
     assert found.trusted
     assert apart(found.rotation, truth.rotation) < 0.3
     assert found.gain == pytest.approx(1, abs=0.03)
+
+
+def test_falloff_is_told_by_what_no_reflection_covers() -> None:
+    arcs = tuple(Arc("front", azimuth, 110, 9, 0.7) for azimuth in (40, 160, 280))
+    phone = replace(PHONE, lens=Lens(fov=192), falloff=0.35, arcs=arcs)
+    truth = lens_light(room(8), phone, 1)
+    given = LensSettings()
+    front, back = views(truth, Lens(fov=190))
+    found = register(front, back, RegistrationSettings(), given, Job("test"))
+    assert found.trusted
+    through = {
+        "front": replace(front, lens=found.lens, circle=found.front),
+        "back": replace(back, lens=found.lens, circle=found.back),
+    }
+    patches = [Patch("front", (arc.azimuth - 57) % 360, 114.0, 85.0, 97.0) for arc in arcs]
+    better = rebalanced(found, through, patches, given)
+
+    def off(one: Registration) -> float:
+        s = np.linspace(0.1, 0.95, 18)
+        return float(np.abs(one.light_at(s) - phone.falloff_at(s)).max())
+
+    assert off(better) < 0.05 < off(found)
+    assert better.rotation is found.rotation
+    unused = [replace(patch, used=False) for patch in patches]
+    assert rebalanced(found, through, unused, given) is found
+    assert rebalanced(replace(found, trusted=False), through, patches, given).falloff == found.falloff
 
 
 def test_near_things_move_it_little() -> None:

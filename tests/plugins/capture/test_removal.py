@@ -15,8 +15,8 @@ from studio_core.capturing.artifacts import Registration, View
 from studio_core.capturing.settings import BACK, FRONT, OTHER_LENS, RING, Patch
 from studio_core.imaging.projection import Circle, Lens, pixel_points, unproject
 from studio_core.shading.job import Job
-from studio_plugins.capture.removal import clean_azimuth, covers, remove
-from studio_plugins.capture.ring import angles
+from studio_plugins.capture.removal import clean_azimuth, remove
+from studio_plugins.capture.ring import angles, covers
 
 PHONE = Phone(size=(300, 300), lens=Lens(fov=194.0), circle=Circle(151.0, 148.0, 130.0), samples=1)
 ARC = Arc(FRONT, 70.0, 40.0, 5.0, 1.3)
