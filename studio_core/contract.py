@@ -85,6 +85,33 @@ class Brdf(Protocol):
         ...
 
 
+class SampledBrdf(Brdf, Protocol):
+    """A model that also draws directions, one term at a time; all bundled models do, plugins may.
+
+    `sampler` and `density` are addresses of C functions, batched over the directions of one shading point
+    like `Brdf.address` (their signatures: `studio_core.kernels.brdf`):
+
+        void sample(const float* shape, const float* wo, int64 term, int64 count, const float* u, float* wi)
+        void density(const float* shape, const float* wo, int64 count, const float* wi, float* out)
+
+    u is u0[count], u1[count] in [0, 1), wi becomes x[count], y[count], z[count]: unit directions about
+    proportional to term × cosine, or any vector with z ≤ 0 where there is none. Best is a map that is
+    smooth, and periodic in u1. `out` is the density per steradian with which each term draws wi: term 0
+    [count], term 1 [count], …, and 0 for z ≤ 0; it integrates to the share of u that gives a direction.
+    Wherever term × cosine is not 0 the density is not, and their ratio is bounded. Finite always.
+    """
+
+    @property
+    def sampler(self) -> int:
+        """Address of `sample`."""
+        ...
+
+    @property
+    def density(self) -> int:
+        """Address of `density`."""
+        ...
+
+
 @dataclass(frozen=True)
 class ImportedModel:
     """Nodes and materials ready to be added, and in sentences what was repaired or left out."""
@@ -209,6 +236,7 @@ __all__ = [
     "PanelMaker",
     "Plugin",
     "Registry",
+    "SampledBrdf",
     "Services",
     "ShadingBackend",
 ]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ctypes
 import functools
 import importlib
 import itertools
@@ -17,6 +16,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from oracles.brdf import ORACLES, albedo, unit
 
+from studio_core.brdfs.calls import evaluate
 from studio_core.params import ParamInfo, defaults, param_infos
 from studio_plugins.brdfs import plugin as bundled
 
@@ -36,17 +36,6 @@ every_model = pytest.mark.parametrize("model", MODELS.values(), ids=MODELS.keys(
 with_oracle = pytest.mark.parametrize(
     "model", [MODELS[name] for name in ORACLES if name in MODELS], ids=lambda m: m.id
 )
-POINTERS = [ctypes.c_void_p] * 2
-
-
-def evaluate(model: Any, shape: Float, wo: Any, wi: Any) -> Float:
-    """(N, terms) of the compiled kernel for one wo (3,) and wi (N, 3)."""
-    call = ctypes.CFUNCTYPE(None, *POINTERS, ctypes.c_int64, *POINTERS)(model.address)
-    wi = np.ascontiguousarray(np.asarray(wi, np.float32).T)
-    wo = np.ascontiguousarray(wo, np.float32)
-    out = np.full((model.terms, wi.shape[1]), np.nan, np.float32)
-    call(shape.ctypes.data, wo.ctypes.data, wi.shape[1], wi.ctypes.data, out.ctypes.data)
-    return out.T
 
 
 def at(info: ParamInfo, fraction: float) -> Any:

@@ -1,0 +1,1 @@
+"""Reflectance models as a whole: called from Python, their albedo, and checks of what they promise."""
