@@ -37,7 +37,6 @@ from studio_core.scene.diff import Aspect
 from studio_core.scene.nodes import Light, Scene
 from studio_core.session import View
 from studio_core.shading.artifacts import (
-    TERMS,
     Hits,
     Picture,
     Radiance,
@@ -193,14 +192,14 @@ class Compositor:
         return self._backdrop.before(environment, normals)
 
     def coefficients(self, surfaces: Surfaces, hits: Hits, table: Coefficients) -> F32:
-        """(N, TERMS, 3) BRDF coefficients of hits on surfaces."""
-        maps, out = table.maps, np.zeros((len(hits.face), TERMS * 3), np.float32)
+        """(N, T, 3) BRDF coefficients of hits on surfaces."""
+        maps, out = table.maps, np.zeros((len(hits.face), table.plain.shape[1]), np.float32)
         faces = (*self._faces(surfaces, hits.view, maps), surfaces.mesh.uvs)
         looks = (maps.kind, table.plain, table.slope, maps.texels, maps.tables)
         layout = (maps.first, maps.size, maps.levels, maps.uv_scale, _pixel_angle(hits.view))
         given = (hits.face, hits.u, hits.v, hits.distance, *faces, *looks, *layout)
         hit_coefficients(*given, out)
-        return out.reshape(-1, TERMS, 3)
+        return out.reshape(-1, table.width, 3)
 
     def _pixels(self, part: Part, behind: Behind, faces: _Faces, tables: _Tables, job: Job | None) -> F32:
         """(P, 3) the pixels of a part before what is behind them."""
@@ -279,12 +278,13 @@ class Compositor:
         count = len(radiance.valid)
         record = np.zeros((count, RECORD), np.float32)
         record[:, 6:] = mesh.uvs
-        sums = np.zeros((count if (maps.kind == GENERAL).any() else 0, TERMS * 3), np.float32)
+        sums = np.zeros((count if (maps.kind == GENERAL).any() else 0, table.plain.shape[1]), np.float32)
         for node, layer in radiance.layers.items():
             light = scene.nodes.get(node)
             if not isinstance(light, Light) or not scene.shown(node):
                 continue
-            terms = np.ascontiguousarray(layer.terms, np.float32).reshape(count, TERMS * 3)
+            terms = np.ascontiguousarray(layer.of_width(table.width).terms, np.float32)
+            terms = terms.reshape(count, table.width * 3)
             of_light = (terms, np.asarray(light.gain(), np.float32), radiance.valid)
             given = (*of_light, mesh.material, maps.kind, table.plain, table.slope, record, sums)
             self._workers.run(count, VERTICES, partial(_add_light, given), job)

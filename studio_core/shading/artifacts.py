@@ -28,7 +28,8 @@ if TYPE_CHECKING:
 
 Source: TypeAlias = tuple[NodeId, Geometry, tuple[MaterialId, ...]]
 """An object, its mesh, the material of each slot."""
-TERMS = 3  # most terms a BRDF may have; kernels and canvases have room for these
+TERMS = 6
+"""Most terms a BRDF may have. Light sums have as many as the scene's materials need."""
 
 F32 = npt.NDArray[np.float32]
 
@@ -107,6 +108,11 @@ class Shapes:
     data: F32
     problems: tuple[str, ...] = ()
 
+    @property
+    def width(self) -> int:
+        """Most terms of one material: T of light sums (V, T, 3)."""
+        return int(self.terms.max(initial=1))
+
 
 @dataclass(frozen=True)
 class Lamp:
@@ -184,10 +190,22 @@ class EdgeHits:
 
 @dataclass(frozen=True)
 class LayerRadiance:
-    """One light's contribution at unit gain: terms (V, TERMS, 3), irradiance (V, 3)."""
+    """One light's contribution at unit gain: terms (V, T, 3), irradiance (V, 3).
+
+    T is the same for all layers, and at least what the scene's materials have.
+    """
 
     terms: F32
     irradiance: F32
+
+    def of_width(self, width: int) -> LayerRadiance:
+        """The same with `width` terms: zeros behind its own, or without the last ones."""
+        count, own = self.terms.shape[:2]
+        if own == width:
+            return self
+        terms = np.zeros((count, width, 3), np.float32)
+        terms[:, :own] = self.terms[:, :width]
+        return LayerRadiance(terms, self.irradiance)
 
 
 @dataclass(frozen=True)
@@ -206,9 +224,14 @@ class Radiance:
     final: bool
     counts: Mapping[str, int] = field(default_factory=dict)
 
+    @property
+    def width(self) -> int:
+        """T of the layers' terms (V, T, 3)."""
+        return next((layer.terms.shape[1] for layer in self.layers.values()), 1)
+
     def combined(self, lights: Mapping[NodeId, Light]) -> F32:
-        """(V, TERMS, 3): the layers weighted with the gains of `lights`; layers without a light are off."""
-        made = np.zeros((len(self.valid), TERMS, 3), np.float32)
+        """(V, T, 3): the layers weighted with the gains of `lights`; layers without a light are off."""
+        made = np.zeros((len(self.valid), self.width, 3), np.float32)
         for node, layer in self.layers.items():
             if node in lights:
                 made += layer.terms * np.asarray(lights[node].gain(), np.float32)
@@ -252,7 +275,7 @@ class Backdrop:
 class VertexColours:
     """What a picture interpolates, for canvases that do so themselves.
 
-    record (V, 8), sums (V or 0, TERMS·3) and maps as in `kernels.compose.shade_hits`; they hold where
+    record (V, 8), sums (V or 0, T·3) and maps as in `kernels.compose.shade_hits`; they hold where
     `Radiance.valid`. What catches shadows is black there, and has in record[:, 3:6] what the backdrop without
     gain is multiplied with. `shown` (V,) are the corners of what the picture shows; others may be turned away
     from its eye, and black. `backdrop` is None where none is seen.

@@ -25,7 +25,6 @@ from studio_core.scene.geometry import Image
 from studio_core.scene.nodes import WHITE, Environment, Light, Node, NodeId, Scene, new_id
 from studio_core.session import View
 from studio_core.shading.artifacts import (
-    TERMS,
     Casters,
     Hits,
     LayerRadiance,
@@ -188,7 +187,7 @@ class PictureMaker:
             turn = sky.rotation().matrix()[:3, :3]
             even = OpenLight(np.ones((96, 192, 3), np.float32)).irradiance(mesh.normals @ turn)
             arrives = (record[:, 3:6] * even).astype(np.float32)
-            layers[white.id] = LayerRadiance(np.zeros((len(arrives), TERMS, 3), np.float32), arrives)
+            layers[white.id] = LayerRadiance(np.zeros((len(arrives), radiance.width, 3), np.float32), arrives)
         return scene.with_nodes(white), dataclasses.replace(radiance, layers=layers)
 
 

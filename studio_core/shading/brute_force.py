@@ -18,7 +18,6 @@ from studio_core.kernels.raycast import RayCaster
 from studio_core.kernels.visibility import occlusion_rays, trace_visibility
 from studio_core.parallel import Workers
 from studio_core.shading.artifacts import (
-    TERMS,
     Lamp,
     LayerRadiance,
     Lighting,
@@ -98,10 +97,10 @@ def _same(a: Directions, b: Directions) -> bool:
     return a is b or np.array_equal(a.directions, b.directions)
 
 
-def blank_layer(mesh: ShadingPoints) -> LayerRadiance:
+def blank_layer(mesh: ShadingPoints, shapes: Shapes) -> LayerRadiance:
     """A layer without light."""
     count = len(mesh.positions)
-    return LayerRadiance(np.zeros((count, TERMS, 3), np.float32), np.zeros((count, 3), np.float32))
+    return LayerRadiance(np.zeros((count, shapes.width, 3), np.float32), np.zeros((count, 3), np.float32))
 
 
 @dataclass(frozen=True)
@@ -164,7 +163,7 @@ def environment_layer(
     quarters: bool = True,
 ) -> LayerRadiance:
     """The environment's layer at unit gain for `points`: see `beams`."""
-    layer = blank_layer(mesh)
+    layer = blank_layer(mesh, shapes)
     if not len(points):
         return layer
     local_eye = (eye - mesh.origin).astype(np.float32)
@@ -218,7 +217,7 @@ def lamp_layer(
     job: Job,
 ) -> LayerRadiance:
     """One lamp's layer at unit gain for `points`, by traced shadow rays to `samples` places of the lamp."""
-    layer = blank_layer(mesh)
+    layer = blank_layer(mesh, shapes)
     targets = lamp_targets(lamp, min(samples, BATCH))
     local_eye = (eye - mesh.origin).astype(np.float32)
     step = max(1, (1 << 20) // len(targets))

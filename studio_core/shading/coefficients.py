@@ -20,7 +20,7 @@ from studio_core.kernels.compose import AFFINE, CONSTANT, GENERAL
 from studio_core.params import Value
 from studio_core.scene.geometry import Image
 from studio_core.scene.nodes import Material, Scene
-from studio_core.shading.artifacts import TERMS, Surfaces
+from studio_core.shading.artifacts import Surfaces
 from studio_core.shading.materials import Resolved, coefficients, linear_rgb, resolve
 
 F32 = npt.NDArray[np.float32]
@@ -29,7 +29,6 @@ I64 = npt.NDArray[np.int64]
 LEVELS = 12
 PROBES = 33
 AFFINE_WITHIN = 1e-5  # of the largest coefficient
-WIDTH = TERMS * 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,7 +36,7 @@ class Maps:
     """Mip levels of all textured materials (M); the same object while no map changes.
 
     Level l < levels[m] of material m starts at row first[m, l] of texels (R, 3) or, where its coefficients
-    are not affine, of tables (R, TERMS·3), and has size[m, l] = (height, width). uv_scale (M, 4) is scale and
+    are not affine, of tables (R, T·3), and has size[m, l] = (height, width). uv_scale (M, 4) is scale and
     offset, kind (M,) says which, as in `kernels.compose`.
     """
 
@@ -52,12 +51,20 @@ class Maps:
 
 @dataclass(frozen=True, eq=False)
 class Coefficients:
-    """Coefficients (M, TERMS·3) are plain + slope · texel, or rows of a map; `typical` are their means."""
+    """Coefficients (M, T·3) are plain + slope · texel, or rows of a map; `typical` are their means.
+
+    T is the most terms that one of the materials has.
+    """
 
     plain: F32
     slope: F32
     typical: F32
     maps: Maps
+
+    @property
+    def width(self) -> int:
+        """T."""
+        return int(self.plain.shape[1] // 3)
 
 
 @dataclass(eq=False)
@@ -74,7 +81,7 @@ class _Pyramid:
 
 @dataclass(frozen=True, eq=False)
 class _Look:
-    """What is known of one material."""
+    """What is known of one material; its coefficients are as many as its model has terms, times 3."""
 
     material: Material
     kind: int
@@ -116,10 +123,10 @@ class CoefficientTable:
     def _look(self, material: Material, pictures: dict[tuple[str, bool], _Pyramid]) -> _Look:
         bare = dataclasses.replace(material, textures=frozen_map()) if material.catches else material
         resolved = resolve(bare, self._registry)  # what catches shadows shows no picture of its own
-        none = np.zeros(WIDTH, np.float32)
         if not resolved.textures:
-            plain = coefficients(resolved).reshape(WIDTH)
-            return _Look(material, CONSTANT, plain, none, plain, None, None, _uv_scale(resolved))
+            plain = coefficients(resolved).ravel()
+            none, where = np.zeros_like(plain), _uv_scale(resolved)
+            return _Look(material, CONSTANT, plain, none, plain, None, None, where)
         if len(resolved.textures) == 1:
             key = _picture_key(resolved)
             found = pictures.get(key) or self._pictures.get(key)
@@ -129,20 +136,22 @@ class CoefficientTable:
             if line is not None:
                 pictures[key] = found
                 plain, slope = line
-                mean = np.tile(found.levels[-1].mean(axis=(0, 1), dtype=np.float32), TERMS)
+                mean = np.tile(found.levels[-1].mean(axis=(0, 1), dtype=np.float32), len(plain) // 3)
                 typical = plain + slope * mean
                 return _Look(material, AFFINE, plain, slope, typical, found, key, _uv_scale(resolved))
-        own = _pyramid(coefficients(resolved).reshape(*_map_size(resolved), WIDTH))
+        own = _pyramid(coefficients(resolved).reshape(*_map_size(resolved), -1))
         typical = own.levels[-1].mean(axis=(0, 1), dtype=np.float32)
+        none = np.zeros_like(typical)
         return _Look(material, GENERAL, none, none, typical, own, None, _uv_scale(resolved))
 
     def _assemble(self, looks: tuple[_Look, ...]) -> Coefficients:
         count = max(len(looks), 1)
         kind, first = np.zeros(count, np.int64), np.zeros((count, LEVELS), np.int64)
         size, uv_scale = np.zeros((count, LEVELS, 2), np.int64), np.zeros((count, 4), np.float32)
-        plain, slope, typical = np.zeros((3, count, WIDTH), np.float32)
+        most = max((len(look.plain) for look in looks), default=3)
+        plain, slope, typical = np.zeros((3, count, most), np.float32)
         arrays = {}
-        for which, channels in ((AFFINE, 3), (GENERAL, WIDTH)):
+        for which, channels in ((AFFINE, 3), (GENERAL, most)):
             used = dict.fromkeys(look.pyramid for look in looks if look.kind == which and look.pyramid)
             arrays[which], starts = self._store(which, tuple(used), channels)
             begin = dict(zip(used, starts, strict=True))
@@ -155,7 +164,8 @@ class CoefficientTable:
                     at += values.shape[0] * values.shape[1]
         for m, look in enumerate(looks):
             kind[m], uv_scale[m] = look.kind, look.uv_scale
-            plain[m], slope[m], typical[m] = look.plain, look.slope, look.typical
+            own = len(look.plain)
+            plain[m, :own], slope[m, :own], typical[m, :own] = look.plain, look.slope, look.typical
         levels = (size[:, :, 0] > 0).sum(axis=1)
         maps = Maps(kind, arrays[AFFINE], arrays[GENERAL], first, size, levels, uv_scale)
         if self._made is not None and _same(maps, self._made[1].maps):
@@ -165,9 +175,9 @@ class CoefficientTable:
     def _store(self, which: int, pyramids: tuple[_Pyramid, ...], channels: int) -> tuple[F32, list[int]]:
         """All levels of some pyramids as rows, and where each pyramid starts; kept while they stay."""
         kept = self._stored.get(which)
-        if kept is not None and kept[0] == pyramids:
+        if kept is not None and kept[0] == pyramids and kept[1].shape[1] == channels:
             return kept[1], kept[2]
-        rows = [level.reshape(-1, channels) for pyramid in pyramids for level in pyramid.levels]
+        rows = [_columns(level, channels) for pyramid in pyramids for level in pyramid.levels]
         lengths = [sum(level.shape[0] * level.shape[1] for level in p.levels) for p in pyramids]
         starts = np.concatenate([[0], np.cumsum(lengths)]).astype(np.int64).tolist()[:-1]
         joined = np.concatenate(rows) if rows else np.zeros((1, channels), np.float32)
@@ -177,11 +187,22 @@ class CoefficientTable:
         return joined, starts
 
 
+def _columns(level: F32, channels: int) -> F32:
+    """A level as rows of as many channels as the material with most terms has."""
+    own = level.reshape(-1, level.shape[2])
+    if own.shape[1] == channels:
+        return own
+    made = np.zeros((len(own), channels), np.float32)
+    made[:, : own.shape[1]] = own[:, :channels]
+    return made
+
+
 def _views(joined: F32, start: int, levels: tuple[F32, ...]) -> tuple[F32, ...]:
+    """The same levels as parts of the rows that they were joined to."""
     made = []
     for level in levels:
         stop = start + level.shape[0] * level.shape[1]
-        made.append(joined[start:stop].reshape(level.shape))
+        made.append(joined[start:stop].reshape(*level.shape[:2], joined.shape[1]))
         start = stop
     return tuple(made)
 
@@ -229,7 +250,7 @@ def _uv_scale(resolved: Resolved) -> F32:
 
 
 def _line(resolved: Resolved, picture: _Pyramid) -> tuple[F32, F32] | None:
-    """Coefficients (TERMS·3,) at texel 0 and their slopes, channel by channel; None where they bend."""
+    """Coefficients (T·3,) at texel 0 and their slopes, channel by channel; None where they bend."""
     low, high = picture.low.astype(np.float64), picture.high.astype(np.float64)
     ramp = np.linspace(0, 1, PROBES)[:, None]
     mixed = np.random.default_rng(0).random((PROBES, 3))
@@ -239,16 +260,16 @@ def _line(resolved: Resolved, picture: _Pyramid) -> tuple[F32, F32] | None:
     if np.ndim(np.asarray(resolved.values[name])) == 0:
         made, at = made[:PROBES], at[:PROBES]  # one channel stands for all
     rise = np.where(high > low, high - low, 1)
-    slope = np.where(high > low, (made[PROBES - 1] - made[0]) / rise, 0)  # (TERMS, 3)
+    slope = np.where(high > low, (made[PROBES - 1] - made[0]) / rise, 0)  # (T, 3)
     plain = made[0] - slope * low
     error = np.abs(plain + slope * at[:, None, :] - made).max(initial=0)
     if not error <= AFFINE_WITHIN * np.abs(made).max(initial=0):
         return None
-    return plain.reshape(WIDTH).astype(np.float32), slope.reshape(WIDTH).astype(np.float32)
+    return plain.ravel().astype(np.float32), slope.ravel().astype(np.float32)
 
 
 def _at_texels(resolved: Resolved, texels: F32) -> F32:
-    """(K, TERMS, 3) coefficients where the one texture has texels (K, 3)."""
+    """(K, T, 3) coefficients where the one texture has texels (K, 3)."""
     values: dict[str, Any] = {}
     for name, value in resolved.values.items():
         if _numeric(value):
@@ -257,9 +278,7 @@ def _at_texels(resolved: Resolved, texels: F32) -> F32:
                 number = number * (texels[:, 0] if number.ndim == 0 else texels)
             values[name] = np.broadcast_to(number, (len(texels), *np.shape(value)))
     made = np.asarray(resolved.brdf.coefficients(values), np.float32)
-    padded = np.zeros((len(texels), TERMS, 3), np.float32)
-    padded[:, : made.shape[-2]] = made
-    return padded
+    return np.broadcast_to(made, (len(texels), *made.shape[-2:]))
 
 
 def _numeric(value: Value) -> bool:

@@ -17,7 +17,6 @@ from studio_core.raster import Coefficients, CoefficientTable, Compositor
 from studio_core.scene.nodes import Light, NodeId
 from studio_core.scene.shading_mesh import NO_BACK
 from studio_core.shading.artifacts import (
-    TERMS,
     Casters,
     ChosenPoints,
     Error,
@@ -142,7 +141,7 @@ class ErrorMeter:
         )
         truth = self._brute(points, shapes, lighting, casters, frame, job)
         lights = _lights(frame)
-        looks = table.typical[mesh.material[some]].reshape(-1, TERMS, 3)
+        looks = table.typical[mesh.material[some]].reshape(-1, table.width, 3)
         shown = (radiance.combined(lights)[some] * looks).sum(axis=1)
         truth = {node: truth[node] for node in radiance.layers}
         exact = dataclasses.replace(radiance, layers=truth, valid=np.ones(len(some), np.bool_))

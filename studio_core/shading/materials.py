@@ -97,8 +97,11 @@ def same_shapes(a: Shapes, b: Shapes) -> bool:
     return all(np.array_equal(x, y) for x, y in pairs)
 
 
-def coefficients(resolved: Resolved) -> npt.NDArray[np.float32]:
-    """(TERMS, 3) of an untextured material, or (H, W, TERMS, 3) with rows from v = 0 up."""
+def coefficients(resolved: Resolved, width: int = 0) -> npt.NDArray[np.float32]:
+    """(T, 3) of an untextured material, or (H, W, T, 3) with rows from v = 0 up.
+
+    T is the model's number of terms, or `width` where that is more: zeros follow.
+    """
     values: dict[str, Any] = {
         name: np.asarray(v, np.float32) for name, v in resolved.values.items() if _numeric(v)
     }
@@ -115,10 +118,16 @@ def coefficients(resolved: Resolved) -> npt.NDArray[np.float32]:
         for name, value in values.items():
             tail = value.shape[-1:] if value.ndim in (1, 3) else ()
             values[name] = np.broadcast_to(value, (*size, *tail))
-    made = np.asarray(resolved.brdf.coefficients(values), np.float32)
-    padded = np.zeros((*made.shape[:-2], TERMS, 3), np.float32)
-    padded[..., : made.shape[-2], :] = made
-    return padded
+    return padded(np.asarray(resolved.brdf.coefficients(values), np.float32), width)
+
+
+def padded(made: npt.NDArray[np.float32], width: int) -> npt.NDArray[np.float32]:
+    """Coefficients (…, K, 3) with at least `width` terms, zeros behind their own."""
+    if made.shape[-2] >= width:
+        return made
+    wider = np.zeros((*made.shape[:-2], width, 3), np.float32)
+    wider[..., : made.shape[-2], :] = made
+    return wider
 
 
 def _numeric(value: Value) -> bool:
@@ -153,4 +162,4 @@ def linear_rgb(image: Image) -> npt.NDArray[np.float32]:
     return np.ascontiguousarray(np.broadcast_to(pixels, (*pixels.shape[:2], 3)))
 
 
-__all__ = ["Resolved", "coefficients", "linear", "linear_rgb", "resolve", "same_shapes", "shapes"]
+__all__ = ["Resolved", "coefficients", "linear", "linear_rgb", "padded", "resolve", "same_shapes", "shapes"]

@@ -25,7 +25,7 @@ from studio_core.scene.face_tree import FaceTree, joined
 from studio_core.scene.nodes import Light, Material, MaterialId, NodeId, Scene
 from studio_core.scene.shading_mesh import ShadingMesh, refined
 from studio_core.scene.world_mesh import WorldMesh
-from studio_core.shading.artifacts import TERMS, Casters, Hits, Radiance, Surfaces
+from studio_core.shading.artifacts import Casters, Hits, Radiance, Surfaces
 from studio_core.shading.frame import Frame
 from studio_core.shading.interpolation import EdgeErrors, edge_errors, squares_saved
 from studio_core.shading.job import Job
@@ -256,9 +256,10 @@ class VertexRadiance:
         """Zeros where `radiance` is not valid."""
         lights = {light.id: light for light in scene.of(Light) if scene.shown(light.id)}
         materials = radiance.surfaces.materials
-        table = np.zeros((len(materials) + 1, TERMS, 3), np.float32)
+        table = np.zeros((len(materials) + 1, radiance.width, 3), np.float32)
         for index, material in enumerate(materials):
-            table[index] = self._mean(scene.material(material))
+            mean = self._mean(scene.material(material))
+            table[index, : len(mean)] = mean
         known = np.flatnonzero(radiance.valid)
         terms = radiance.combined(lights)[known]
         made = np.zeros((len(radiance.valid), 3), np.float32)
@@ -268,8 +269,9 @@ class VertexRadiance:
     def _mean(self, material: Material) -> F32:
         known = self._means.get(material.id)
         if known is None or known[0] is not material:
-            made = coefficients(resolve(material, self._registry)).reshape(-1, TERMS, 3).mean(axis=0)
-            known = self._means[material.id] = (material, made.astype(np.float32))
+            made = coefficients(resolve(material, self._registry))
+            mean = made.reshape(-1, *made.shape[-2:]).mean(axis=0).astype(np.float32)
+            known = self._means[material.id] = (material, mean)
         return known[1]
 
 

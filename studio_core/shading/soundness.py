@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from studio_core.shading.artifacts import TERMS, Hits, Radiance
+from studio_core.shading.artifacts import Hits, Radiance
 
 
 class UnsoundError(ValueError):
@@ -30,10 +30,11 @@ class Soundness:
             raise UnsoundError(f"it gave {kinds}, not radiance and hits")
         known, mesh = {id(thing) for thing in self._sound}, radiance.surfaces.mesh
         self._sound = ()
-        count = len(mesh.positions)
+        count, every = len(mesh.positions), [layer.terms for layer in radiance.layers.values()]
+        width = next((terms.shape[1] for terms in every if getattr(terms, "ndim", 0) == 3), 1)
         _fits("valid", radiance.valid, (count,), np.bool_)
         for node, layer in radiance.layers.items():
-            _fits(f"terms of {node}", layer.terms, (count, TERMS, 3), np.float32)
+            _fits(f"terms of {node}", layer.terms, (count, width, 3), np.float32)
             _fits(f"irradiance of {node}", layer.irradiance, (count, 3), np.float32)
             for numbers in (layer.terms, layer.irradiance):
                 if id(numbers) not in known:

@@ -7,7 +7,7 @@ import numpy.typing as npt
 
 from studio_core.contract import Registry
 from studio_core.scene.nodes import Light, Scene
-from studio_core.shading.artifacts import TERMS, Radiance
+from studio_core.shading.artifacts import Radiance
 from studio_core.shading.materials import coefficients, resolve
 
 
@@ -21,9 +21,9 @@ def vertex_radiance(scene: Scene, radiance: Radiance, registry: Registry) -> npt
         if not len(own):
             continue
         resolved = resolve(scene.material(material), registry)
-        table = coefficients(resolved)
+        table = coefficients(resolved, radiance.width)
         if table.ndim == 2:
-            weights = np.broadcast_to(table, (len(own), TERMS, 3))
+            weights = np.broadcast_to(table, (len(own), *table.shape))
         else:
             texture = next(iter(resolved.textures.values()))
             uv = mesh.uvs[own] * np.array(texture.scale, np.float32) + np.array(texture.offset, np.float32)

@@ -7,7 +7,6 @@ import numpy.typing as npt
 from oracles.radiance import bilinear_repeat, lat_long
 
 from studio_core.scene.nodes import ON_THE_GROUND, Light
-from studio_core.shading.artifacts import TERMS
 from studio_core.shading.lamps import shown_environment
 from studio_core.shading.materials import coefficients, linear_rgb, resolve
 from studio_core.shading.open_light import OpenLight
@@ -34,9 +33,9 @@ class Painter:
         self.maps, self.uv = [], []
         for name in radiance.surfaces.materials:
             resolved = resolve(scene.material(name), registry)
-            base = coefficients(resolved).astype(np.float64).reshape(-1, 1, TERMS, 3)
+            base = coefficients(resolved, radiance.width).astype(np.float64)[None, None]
             if resolved.textures:
-                base = coefficients(resolved).astype(np.float64)
+                base = coefficients(resolved, radiance.width).astype(np.float64)
             levels = [base]
             while max(levels[-1].shape[:2]) > 1 and len(levels) < 12:
                 levels.append(halved(levels[-1]))

@@ -11,7 +11,7 @@ from studio_core.colour import LUMINANCE
 from studio_core.contract import Registry, Services
 from studio_core.scene.diff import Aspect
 from studio_core.scene.nodes import Material, NodeId, Scene
-from studio_core.shading.artifacts import TERMS, Shapes, Surfaces
+from studio_core.shading.artifacts import Shapes, Surfaces
 from studio_core.shading.frame import Frame
 from studio_core.shading.job import Job
 from studio_core.shading.materials import coefficients, resolve
@@ -205,10 +205,9 @@ class LobeWeights:
         self._kept: dict[MaterialKey, tuple[Material, F32]] = {}
 
     def __call__(self, scene: Scene, materials: tuple[str, ...]) -> F32:
-        """(M + 1, TERMS)."""
-        made = np.zeros((len(materials) + 1, TERMS), np.float32)
+        """(M + 1, T)."""
         kept: dict[MaterialKey, tuple[Material, F32]] = {}
-        for row, name in enumerate(materials):
+        for name in materials:
             material = scene.material(name)
             had = self._kept.get(name)
             if had is None or had[0] is not material:
@@ -216,8 +215,11 @@ class LobeWeights:
                 mean = table.reshape(-1, *table.shape[-2:]).mean(axis=0) @ np.array(LUMINANCE, np.float32)
                 had = material, np.asarray(mean, np.float32)
             kept[name] = had
-            made[row, : len(had[1])] = had[1]
         self._kept = kept
+        found = [kept[name][1] for name in materials]
+        made = np.zeros((len(found) + 1, max(map(len, found), default=1)), np.float32)
+        for row, mean in enumerate(found):
+            made[row, : len(mean)] = mean
         return made
 
 

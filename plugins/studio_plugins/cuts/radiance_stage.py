@@ -10,7 +10,7 @@ import numpy.typing as npt
 from studio_core.contract import Services
 from studio_core.scene.diff import Aspect
 from studio_core.scene.nodes import NodeId
-from studio_core.shading.artifacts import TERMS, Hits, LayerRadiance, Radiance, Shapes, Surfaces
+from studio_core.shading.artifacts import Hits, LayerRadiance, Radiance, Shapes, Surfaces
 from studio_core.shading.frame import Frame
 from studio_core.shading.job import Job
 from studio_core.shading.pipeline import Inputs
@@ -71,11 +71,13 @@ class RadianceStage:
         looked = shaded = 0
         for node, pairs in inputs[Focused].layers:
             before = self._layers.get(node)
+            if before is not None:  # materials that have other terms now are shaded again anyway
+                before = _Layer(before.radiance.of_width(shapes.width), before.version)
             tables = [table for pair in pairs for table in pair if table is not None]
             versions = [table.version.copy() for table in tables]
             if before is None or moved or len(before.version) != len(versions):
                 dirty = summed
-                terms = np.zeros((count, TERMS, 3), np.float32)
+                terms = np.zeros((count, shapes.width, 3), np.float32)
                 irradiance = np.zeros((count, 3), np.float32)
             else:
                 fresh = ~other

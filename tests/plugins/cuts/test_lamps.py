@@ -79,7 +79,7 @@ class Bench:
 
     def layer(self):
         mesh = self.room.mesh
-        terms = np.zeros((len(mesh), TERMS, 3), np.float32)
+        terms = np.zeros((len(mesh), self.shapes.width, 3), np.float32)
         eye, every = (EYE - mesh.origin).astype(np.float32), np.ones(len(mesh), np.bool_)
         self.cache.table.shade(mesh, self.shapes, eye, every, terms, self.workers, Job("test"))
         return terms, self.cache.table.irradiance

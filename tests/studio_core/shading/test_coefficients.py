@@ -13,7 +13,6 @@ from hypothesis import strategies as st
 from studio_core.kernels.compose import AFFINE, CONSTANT, GENERAL
 from studio_core.scene.geometry import Image, Texture
 from studio_core.scene.nodes import Material, Scene
-from studio_core.shading.artifacts import TERMS
 from studio_core.shading.coefficients import CoefficientTable
 from studio_core.shading.materials import coefficients, resolve
 
@@ -53,11 +52,12 @@ def test_texels_give_the_coefficients_of_the_model(host, look, kind):
     maps = table.maps
     assert maps.kind[0] == kind
     resolved = resolve(look, host)
-    expected = coefficients(resolved).reshape(-1, TERMS * 3)
+    expected = coefficients(resolved).reshape(-1, resolved.brdf.terms * 3)
     made = table.plain[0][None]
     start, count = maps.first[0, 0], int(np.prod(maps.size[0, 0]))
     if kind == AFFINE:
-        made = table.plain[0] + table.slope[0] * np.tile(maps.texels[start : start + count], TERMS)
+        texels = np.tile(maps.texels[start : start + count], resolved.brdf.terms)
+        made = table.plain[0] + table.slope[0] * texels
     elif kind == GENERAL:
         made = maps.tables[start : start + count]
     np.testing.assert_allclose(made, expected, atol=2e-6)
@@ -119,7 +119,23 @@ def test_pictures_that_are_no_longer_used_are_dropped_and_come_back_right(host):
     np.testing.assert_array_equal(table_of(host, one, two, keeper=keeper).maps.texels, both.maps.texels)
 
 
+def test_tables_are_as_wide_as_the_material_with_most_terms(host):
+    keeper = CoefficientTable(host)
+    own = material("phong", {"diffuse": PICTURE}, {"diffuse": (1.0,) * 3, "specular": (0.5,) * 3}, name="a")
+    three = material("ggx", {}, {"metallic": 0.3}, name="b")
+    two = coefficients(resolve(own, host)).reshape(-1, 6)
+    for looks, width in (((own,), 2), ((own, three), 3), ((own,), 2)):
+        table = table_of(host, *looks, keeper=keeper)
+        assert table.width == width
+        assert table.maps.tables.shape[1] == table.plain.shape[1] == 3 * width
+        start, count = table.maps.first[0, 0], int(np.prod(table.maps.size[0, 0]))
+        rows = table.maps.tables[start : start + count]
+        np.testing.assert_allclose(rows[:, :6], two, atol=2e-6)
+        assert not rows[:, 6:].any()
+        assert not table.typical[0, 6:].any()
+
+
 def test_no_material_at_all(host):
     table = table_of(host)
-    assert table.plain.shape == (1, TERMS * 3)
+    assert table.plain.shape == (1, 3)
     assert table.maps.kind.tolist() == [CONSTANT]

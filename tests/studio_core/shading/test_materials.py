@@ -7,8 +7,7 @@ import pytest
 
 from studio_core.scene.geometry import Image, Texture
 from studio_core.scene.nodes import Material, Scene
-from studio_core.shading.artifacts import TERMS
-from studio_core.shading.materials import coefficients, linear, resolve, same_shapes, shapes
+from studio_core.shading.materials import coefficients, linear, padded, resolve, same_shapes, shapes
 
 
 def ggx(**values):
@@ -38,9 +37,13 @@ def test_a_change_of_colour_keeps_the_shapes(host):
 
 def test_untextured_coefficients_are_the_models(host):
     made = coefficients(resolve(Material(id="m", name="m", values={"base_color": (0.2, 0.4, 0.6)}), host))
-    assert made.shape == (TERMS, 3)
+    assert made.shape == (1, 3)
     np.testing.assert_allclose(made[0] * np.pi, (0.2, 0.4, 0.6), rtol=1e-6)
-    assert not made[1:].any()
+    wider = padded(made, 4)
+    assert wider.shape == (4, 3)
+    np.testing.assert_array_equal(wider[0], made[0])
+    assert not wider[1:].any()
+    assert padded(wider, 2) is wider
 
 
 def test_a_texture_multiplies_its_parameter_with_rows_upwards(host):
@@ -69,7 +72,7 @@ def test_textures_of_different_sizes_and_scalars_meet(host):
         },
     )
     made = coefficients(resolve(material, host))
-    assert made.shape == (4, 4, TERMS, 3)
+    assert made.shape == (4, 4, 3, 3)
     assert (made[:, :2, 0] > 0).all()  # left half is no metal: it has a matte part
     assert not made[:, 2:, 0].any()
 

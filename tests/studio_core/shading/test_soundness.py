@@ -16,7 +16,7 @@ from studio_core.raster import PictureStage
 from studio_core.registry import PluginHost
 from studio_core.scene.diff import Changes
 from studio_core.session import View
-from studio_core.shading.artifacts import TERMS, Hits, Radiance, Surfaces
+from studio_core.shading.artifacts import Hits, Radiance, Surfaces
 from studio_core.shading.frame import Frame
 from studio_core.shading.job import Job
 from studio_core.shading.offline import backend_params, scene_view
@@ -68,7 +68,7 @@ def test_numbers_that_are_none_are_found_where_something_is_lit(made: tuple[Radi
 @pytest.mark.parametrize(
     ("fields", "why"),
     [
-        ({"terms": np.zeros((3, TERMS, 3), np.float32)}, "terms of .* should be float32"),
+        ({"terms": np.zeros((3, 3, 3), np.float32)}, "terms of .* should be float32"),
         ({"terms": [1, 2, 3]}, "and is list"),
         ({"irradiance": None}, "irradiance of .* and is NoneType"),
     ],

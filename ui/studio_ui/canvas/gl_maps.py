@@ -14,7 +14,6 @@ import numpy.typing as npt
 from vispy import gloo
 
 from studio_core.kernels.compose import AFFINE
-from studio_core.shading.artifacts import TERMS
 from studio_core.shading.coefficients import Maps
 from studio_ui.canvas.gl_buffers import Tally
 
@@ -109,11 +108,11 @@ def picture(pixels: F32, internalformat: str) -> Any:
 
 
 def _levels(maps: Maps, material: int) -> list[F32]:
-    rows, channels = (maps.texels, 3) if maps.kind[material] == AFFINE else (maps.tables, TERMS * 3)
+    rows = maps.texels if maps.kind[material] == AFFINE else maps.tables
     made = []
     for level in range(int(maps.levels[material])):
         first, (high, wide) = int(maps.first[material, level]), maps.size[material, level].tolist()
-        made.append(rows[first : first + high * wide].reshape(high, wide, channels))
+        made.append(rows[first : first + high * wide].reshape(high, wide, rows.shape[1]))
     return made
 
 

@@ -154,8 +154,9 @@ class Renderer:
         """Try out all programs without drawing anything."""
         for kind in (CONSTANT, AFFINE, GENERAL):
             for peeled in (False, True):
-                self._program((kind, peeled), *shaders.mesh_program(kind, peeled, LEVELS))
-        self._program((CAUGHT, False), *shaders.mesh_program(CAUGHT, False, LEVELS))
+                terms = {AFFINE: 1, GENERAL: 3}.get(kind, 0)
+                self._program((kind, peeled, terms), *shaders.mesh_program(kind, peeled, LEVELS, terms))
+        self._program((CAUGHT, False, 0), *shaders.mesh_program(CAUGHT, False, LEVELS))
         self._program("plain", *shaders.plain_program(shaders.PLAIN_FRAGMENT))
         self._program("layer", *shaders.plain_program(shaders.LAYER_FRAGMENT))
         self._program("backdrop", shaders.SCREEN_VERTEX, BACKDROP_FRAGMENT)
@@ -194,8 +195,9 @@ class Renderer:
                 continue
             if kind == CAUGHT and self._sky.backdrop is None:
                 kind = CONSTANT  # there is no photograph: it is as black as it is by itself
-            sources = shaders.mesh_program(kind, layer is not None, LEVELS)
-            program = self._program((kind, layer is not None), *sources)
+            terms = max(len(batch.atlas.textures) if batch.atlas else 0 for _, batch in batches)
+            sources = shaders.mesh_program(kind, layer is not None, LEVELS, terms)
+            program = self._program((kind, layer is not None, terms), *sources)
             program["u_projection"] = camera.projection.T
             program["u_gain"] = gain
             if layer is not None:
@@ -230,7 +232,7 @@ class Renderer:
         if batch.kind == AFFINE:
             program["a_slope"] = body.slope.buffer
         else:
-            for number, attribute in enumerate(body.sums):
+            for number, attribute in enumerate(body.sums[: len(atlas.textures)]):
                 program[f"a_sum{number}"] = attribute.buffer
 
     def _place(self, program: Any, camera: Camera, body: Body, batch: Batch) -> None:

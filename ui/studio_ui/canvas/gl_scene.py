@@ -14,7 +14,7 @@ from studio_core.kernels.compose import AFFINE, CAUGHT, CONSTANT, GENERAL
 from studio_core.scene.nodes import NodeId
 from studio_core.scene.shading_mesh import NO_BACK, ShadingMesh
 from studio_core.scene.transform import IDENTITY, Transform
-from studio_core.shading.artifacts import Picture, Surfaces
+from studio_core.shading.artifacts import TERMS, Picture, Surfaces
 from studio_core.shading.coefficients import Maps
 from studio_ui.canvas.gl_buffers import GROWTH, Attribute, Tally
 from studio_ui.canvas.gl_maps import Atlas, Atlases
@@ -152,7 +152,7 @@ class GlScene:
         self.bodies, self.nodes, self._shapes, self._picture = [], (), {}, None
 
     def _attributes(self) -> tuple[Attribute, Attribute, tuple[Attribute, ...]]:
-        plain, slope, *sums = (Attribute(3, self.tally, "colours") for _ in range(5))
+        plain, slope, *sums = (Attribute(3, self.tally, "colours") for _ in range(2 + TERMS))
         return plain, slope, tuple(sums)
 
     def _shape(self, mesh: ShadingMesh, before: Body | None, wanted: set[int]) -> Shape:
@@ -234,7 +234,7 @@ class GlScene:
         if kinds & {AFFINE, CAUGHT}:
             wanted.append((body.slope, record[:, 3:6]))
         if GENERAL in kinds:
-            wanted += [(body.sums[k], sums[:, 3 * k : 3 * k + 3]) for k in range(3)]
+            wanted += [(body.sums[k], sums[:, 3 * k : 3 * k + 3]) for k in range(sums.shape[1] // 3)]
         known, shown = picture.radiance.valid[own], colours.shown[own]
         if not shown.all():  # what is turned away is black; who turns the view wants to see something better
             lit = shown.copy()

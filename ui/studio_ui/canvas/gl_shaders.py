@@ -26,12 +26,8 @@ attribute vec3 a_slope;
 varying vec3 v_slope;
 #endif
 #ifdef GENERAL
-attribute vec3 a_sum0;
-attribute vec3 a_sum1;
-attribute vec3 a_sum2;
-varying vec3 v_sum0;
-varying vec3 v_sum1;
-varying vec3 v_sum2;
+EACH attribute vec3 a_sum@;
+EACH varying vec3 v_sum@;
 #endif
 uniform mat4 u_eye_from_model;
 uniform mat4 u_projection;
@@ -49,9 +45,7 @@ void main() {
     v_slope = a_slope;
 #endif
 #ifdef GENERAL
-    v_sum0 = a_sum0;
-    v_sum1 = a_sum1;
-    v_sum2 = a_sum2;
+EACH    v_sum@ = a_sum@;
 #endif
     gl_Position = u_projection * vec4(v_eye, 1.0);
 }
@@ -141,12 +135,8 @@ uniform vec3 u_from;   // of the eye, in the picture's frame: 0 where the pictur
     + """
 #endif
 #ifdef GENERAL
-varying vec3 v_sum0;
-varying vec3 v_sum1;
-varying vec3 v_sum2;
-uniform sampler2D u_map0;
-uniform sampler2D u_map1;
-uniform sampler2D u_map2;
+EACH varying vec3 v_sum@;
+EACH uniform sampler2D u_map@;
 #endif
 
 void main() {
@@ -161,9 +151,7 @@ void main() {
     light += sky(u_turn * v_eye + u_from) * v_slope;
 #endif
 #ifdef GENERAL
-    light += texel(u_map0, level, v_uv) * v_sum0;
-    light += texel(u_map1, level, v_uv) * v_sum1;
-    light += texel(u_map2, level, v_uv) * v_sum2;
+EACH    light += texel(u_map@, level, v_uv) * v_sum@;
 #endif
     float away = length(v_eye);
 #ifdef PEELED
@@ -347,17 +335,32 @@ def display_program() -> tuple[str, str]:
     return SCREEN_VERTEX.strip(), _defined(source, defines)
 
 
-def mesh_program(kind: int, peeled: bool, levels: int) -> tuple[str, str]:
-    """Vertex and fragment shader for surfaces whose coefficients are of a kind of `kernels.compose`."""
+def mesh_program(kind: int, peeled: bool, levels: int, terms: int = 3) -> tuple[str, str]:
+    """Vertex and fragment shader for surfaces whose coefficients are of a kind of `kernels.compose`.
+
+    `terms`: how many those with a map of their own have.
+    """
     names = ["LIT", *_NAMES.get(kind, ())]
     names += ["PEELED"] if peeled else []
     defines = "".join(f"#define {name}\n" for name in names) + f"#define LEVELS {levels}\n"
-    return _defined(MESH_VERTEX, defines), _defined(MESH_FRAGMENT, defines)
+    vertex, fragment = (_for_each(source, terms) for source in (MESH_VERTEX, MESH_FRAGMENT))
+    return _defined(vertex, defines), _defined(fragment, defines)
+
+
+def _for_each(source: str, terms: int) -> str:
+    """Lines that begin with EACH once for every term, with its number for @."""
+    made = []
+    for line in source.split("\n"):
+        if line.startswith("EACH"):
+            made += [line.removeprefix("EACH").replace("@", str(k)) for k in range(terms)]
+        else:
+            made.append(line)
+    return "\n".join(made)
 
 
 def plain_program(fragment: str) -> tuple[str, str]:
     """The surfaces' vertex shader with a fragment shader that does not ask for their light."""
-    return _defined(MESH_VERTEX, ""), fragment.strip()
+    return _defined(_for_each(MESH_VERTEX, 0), ""), fragment.strip()
 
 
 def _defined(source: str, defines: str) -> str:
