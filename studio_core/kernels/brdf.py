@@ -95,3 +95,43 @@ def smith_factor(cosine: np.float32, alpha: np.float32) -> np.float32:
     a2 = alpha * alpha
     made: np.float32 = ONE / (cosine + np.sqrt(a2 + (ONE - a2) * cosine * cosine))
     return made
+
+
+_C0, _C1, _C2 = np.float32(1.5707963050), np.float32(-0.2145988016), np.float32(0.0889789874)
+_C3, _C4, _C5 = np.float32(-0.0501743046), np.float32(0.0308918810), np.float32(-0.0170881256)
+_C6, _C7 = np.float32(0.0066700901), np.float32(-0.0012624911)
+
+
+@kernel
+def arc_cosine(c: np.float32) -> np.float32:
+    """arccos(c) of 0 ≤ c ≤ 1 within 2e-7: √(1 − c) times a polynomial (Abramowitz & Stegun 4.4.46)."""
+    p = _C4 + c * (_C5 + c * (_C6 + c * _C7))
+    p = _C0 + c * (_C1 + c * (_C2 + c * (_C3 + c * p)))
+    made: np.float32 = p * np.sqrt(max(ONE - c, ZERO))
+    return made
+
+
+@kernel
+def exponential(y: np.float32) -> np.float32:
+    """e^y for y ≤ 0 within 1e-6 of the result; 0 below 1e-37."""
+    power = y * np.float32(1 / np.log(2))
+    clamped = max(power, _LEAST_POWER)
+    whole = np.floor(clamped)
+    f = clamped - whole - HALF
+    scale = np.int32((np.int32(whole) + _BIAS) << _SHIFT).view(np.float32)
+    fraction = ONE + f * (_E1 + f * (_E2 + f * (_E3 + f * (_E4 + f * (_E5 + f * _E6)))))
+    return scale * fraction * np.float32(1.4142135623730951) if power > _LEAST_POWER else ZERO
+
+
+@kernel
+def dielectric_fresnel(cosine: np.float32, index2: np.float32) -> np.float32:
+    """Reflected share of unpolarised light from outside; `index2` is the squared index of refraction ≥ 1.
+
+    Walter et al. 2007, eq. 22. Total at grazing, and none where the index is 1.
+    """
+    c = min(cosine, ONE)
+    g = np.sqrt(max(index2 - ONE, ZERO) + c * c)
+    side = (g - c) / max(g + c, np.float32(1e-12))
+    ratio = (c * (g + c) - ONE) / (c * (g - c) + ONE)
+    made: np.float32 = HALF * side * side * (ONE + ratio * ratio)
+    return made

@@ -85,8 +85,33 @@ def ggx(values: Values, wo: Array, wi: Array) -> Array:
     return above[..., None] * (matte + specular)
 
 
+def oren_nayar(values: Values, wo: Array, wi: Array) -> Array:
+    """(..., 3) f_r of `oren-nayar`: EON, its directional albedo with the tangent as printed."""
+    wo, wi = unit(wo), unit(wi)
+    above = _above(wo, wi)
+    r = float(values["roughness"])
+    rho = _colour(values["base_color"])
+    a = 1 / (1 + (1 / 2 - 2 / (3 * np.pi)) * r)
+    mean = a * (1 + (2 / 3 - 28 / (15 * np.pi)) * r)
+
+    def single(c: Array) -> Array:
+        theta = np.arccos(np.clip(c, 1e-7, 1))
+        sine = np.sin(theta)
+        g = sine * (theta - sine * np.cos(theta)) + 2 / 3 * (np.tan(theta) * (1 - sine**3) - sine)
+        return a + r * a / np.pi * g
+
+    no, ni = wo[..., 2], wi[..., 2]
+    s = (wo * wi).sum(-1) - no * ni
+    t = np.where(s > 0, np.maximum(np.maximum(no, ni), 1e-30), 1.0)
+    first = (a * (1 + r * s / t) / np.pi)[..., None] * rho
+    bounced = rho**2 * mean / (1 - rho * (1 - mean))
+    lost = (1 - single(no)) * (1 - single(ni)) / (np.pi * (1 - mean)) if r > 1e-12 else np.zeros(no.shape)
+    return above[..., None] * (first + bounced * lost[..., None])
+
+
 ORACLES: dict[str, Callable[[Values, Array, Array], Array]] = {
     "lambert": lambert,
+    "oren-nayar": oren_nayar,
     "phong": phong,
     "blinn-phong": blinn_phong,
     "ggx": ggx,

@@ -10,6 +10,7 @@ plugin = Plugin(
     provides={
         "brdf": {
             "lambert": f"{_HERE}.lambert:MODEL",
+            "oren-nayar": f"{_HERE}.oren_nayar:MODEL",
             "phong": f"{_HERE}.phong:MODEL",
             "blinn-phong": f"{_HERE}.blinn_phong:MODEL",
             "ggx": f"{_HERE}.ggx:MODEL",

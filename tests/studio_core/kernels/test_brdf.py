@@ -8,7 +8,13 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from studio_core.kernels.brdf import power_of_complement, schlick_weight
+from studio_core.kernels.brdf import (
+    arc_cosine,
+    dielectric_fresnel,
+    exponential,
+    power_of_complement,
+    schlick_weight,
+)
 
 
 @settings(max_examples=400, deadline=None)
@@ -34,3 +40,30 @@ def test_powers_keep_their_digits_near_zero(rest: float, n: float) -> None:
     made = power_of_complement(np.float32(1 - rest), np.float32(rest), np.float32(n))
     if rest**n > 1e-36:
         assert abs(made / rest**n - 1) < 2e-5
+
+
+@settings(deadline=None)
+@given(c=st.floats(0, 1, width=32))
+def test_arc_cosine(c: float) -> None:
+    assert abs(arc_cosine(np.float32(c)) - math.acos(c)) < 5e-7
+
+
+@settings(deadline=None)
+@given(y=st.floats(-200, 0, width=32))
+def test_exponential(y: float) -> None:
+    made = exponential(np.float32(y))
+    if y > -85:
+        assert abs(made / math.exp(y) - 1) < 3e-5
+    else:
+        assert 0 <= made < 1e-36
+
+
+@settings(deadline=None)
+@given(angle=st.floats(0, math.pi / 2), index=st.floats(1, 4))
+def test_dielectric_fresnel_is_the_mean_of_both_polarisations(angle: float, index: float) -> None:
+    c, inside = math.cos(angle), math.sqrt(1 - (math.sin(angle) / index) ** 2)
+    across = (c - index * inside) / (c + index * inside) if c > 0 else -1.0
+    along = (index * c - inside) / (index * c + inside) if c > 0 else -1.0
+    made = dielectric_fresnel(np.float32(c), np.float32(index) ** 2)
+    assert abs(made - (across**2 + along**2) / 2) < 3e-6 + 2e-5 * (index > 1) * made
+    assert 0 <= made <= 1.000001
