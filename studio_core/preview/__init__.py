@@ -1,0 +1,1 @@
+"""Small pictures and curves that show what a material is like, without a scene around it."""

@@ -1,0 +1,75 @@
+"""A material's reflectance as curves: its lobe in the plane of incidence, its albedo against the angle.
+
+Both are of the material's own values; pictures on it are left out.
+"""
+
+from __future__ import annotations
+
+import functools
+
+import numpy as np
+import numpy.typing as npt
+
+from studio_core.preview.fan import Fan, fan
+from studio_core.brdfs.calls import evaluate
+from studio_core.shading.materials import Resolved
+
+F32 = npt.NDArray[np.float32]
+F64 = npt.NDArray[np.float64]
+
+STEEPEST = 89.5
+"""Degrees beyond which nothing is seen of a surface."""
+_GRADED = np.geomspace(1e-3, 30, 64)  # degrees beside the mirror direction: sharp lobes are drawn whole
+
+
+def lobe(resolved: Resolved, incidence: float, *, cosine: bool = True) -> tuple[F64, F64]:
+    """Angles (N,) in degrees from -90 to 90, and f_r (N, 3) towards them, times their cosine if asked for.
+
+    Light comes from `incidence` degrees to the left of the normal; the mirror direction is at +incidence.
+    Angles are rising and lie closer around the mirror direction.
+    """
+    incidence = min(max(incidence, 0.0), STEEPEST)
+    every = [np.linspace(-90, 90, 181), incidence + _GRADED, incidence - _GRADED, [incidence, -incidence]]
+    angles = np.unique(np.concatenate(every))
+    angles = angles[np.abs(angles) <= 90]
+    turn = np.radians(angles)
+    wi = np.stack([np.sin(turn), np.zeros_like(turn), np.cos(turn)], axis=1)
+    wi[:, 2] = np.maximum(wi[:, 2], 1e-9)
+    toward = np.radians(incidence)
+    wo = np.array([-np.sin(toward), 0.0, np.cos(toward)])  # the other way round is the same
+    terms = evaluate(resolved.brdf, _shape(resolved), wo, wi).astype(np.float64)
+    made = terms @ colours(resolved)
+    return angles, made * np.cos(turn)[:, None] if cosine else made
+
+
+def albedo(resolved: Resolved, angles: npt.ArrayLike) -> F64:
+    """(A, 3) share of light from degrees (A,) that comes back in all, within 1 % where lobes are round."""
+    shape, weights = _shape(resolved), colours(resolved)
+    rows = []
+    for angle in np.atleast_1d(np.asarray(angles, np.float64)):
+        own = _fan(min(max(float(angle), 0.0), STEEPEST))
+        light = evaluate(resolved.brdf, shape, own.wo, own.wi) * (own.wi[:, 2] * own.solid)[:, None]
+        rows.append(light.sum(axis=0, dtype=np.float64) @ weights)
+    return np.array(rows)
+
+
+def colours(resolved: Resolved) -> F64:
+    """(terms, 3) coefficients without pictures."""
+    numbers = {
+        name: np.asarray(value, np.float32)
+        for name, value in resolved.values.items()
+        if not isinstance(value, str | bool)
+    }
+    return np.asarray(resolved.brdf.coefficients(numbers), np.float64).reshape(-1, 3)
+
+
+def _shape(resolved: Resolved) -> F32:
+    return np.atleast_1d(np.asarray(resolved.brdf.shape(resolved.values), np.float32))
+
+
+@functools.lru_cache(maxsize=256)
+def _fan(angle: float) -> Fan:
+    return fan(float(np.cos(np.radians(angle))))
+
+
+__all__ = ["STEEPEST", "albedo", "colours", "lobe"]
