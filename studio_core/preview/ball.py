@@ -18,11 +18,11 @@ from typing import Any, Generic, TypeVar
 import numpy as np
 import numpy.typing as npt
 
+from studio_core.brdfs.calls import evaluate
 from studio_core.contract import Brdf, Registry
 from studio_core.preview.fan import DIRECTIONS, Fan, fan
 from studio_core.preview.light import PreviewLight
 from studio_core.preview.sphere import Sphere, disc, over_disc, sphere
-from studio_core.brdfs.calls import evaluate
 from studio_core.scene.geometry import Image, Texture
 from studio_core.scene.nodes import Material
 from studio_core.shading.materials import Resolved, linear_rgb, resolve
@@ -108,9 +108,7 @@ class Balls:
             pixels = pixels + over_disc(shone, disc(size, *_fine(size)))
         return np.ascontiguousarray(pixels.transpose(0, 2, 1))
 
-    def _shine(
-        self, brdf: Brdf, shape: F32, points: Sphere, sun: F32, irradiance: F32, grained: bool
-    ) -> F32:
+    def _shine(self, brdf: Brdf, shape: F32, points: Sphere, sun: F32, irradiance: F32, grained: bool) -> F32:
         """(R, T, 3, terms) of the suns."""
         rings, turns, samples = sun.shape[:3]
         made = np.empty((rings, turns, 3, brdf.terms), np.float32)
@@ -255,7 +253,7 @@ def _has_grain(brdf: Brdf, shape: F32) -> bool:
     wi[:, 2] = np.abs(wi[:, 2])
     wi /= np.linalg.norm(wi, axis=1, keepdims=True)
     wo = np.array([0.6, 0.0, 0.8], np.float32)
-    mirrored = wo * np.float32([-1, -1, 1])  # and around the mirror direction, where lobes are
+    mirrored = np.array([-0.6, 0.0, 0.8], np.float32)  # and around it, where lobes are
     wi[:32] = mirrored + 0.2 * wi[:32] * np.linspace(0, 1, 32, dtype=np.float32)[:, None]
     wi /= np.linalg.norm(wi, axis=1, keepdims=True)
     straight = evaluate(brdf, shape, wo, wi)

@@ -10,8 +10,9 @@ import functools
 import numpy as np
 import numpy.typing as npt
 
-from studio_core.preview.fan import Fan, fan
+from studio_core.brdfs.albedo import albedo_table, flat_coefficients
 from studio_core.brdfs.calls import evaluate
+from studio_core.preview.fan import Fan, fan
 from studio_core.shading.materials import Resolved
 
 F32 = npt.NDArray[np.float32]
@@ -29,8 +30,9 @@ def lobe(resolved: Resolved, incidence: float, *, cosine: bool = True) -> tuple[
     Angles are rising and lie closer around the mirror direction.
     """
     incidence = min(max(incidence, 0.0), STEEPEST)
-    every = [np.linspace(-90, 90, 181), incidence + _GRADED, incidence - _GRADED, [incidence, -incidence]]
-    angles = np.unique(np.concatenate(every))
+    own = np.array([incidence, -incidence])
+    every = np.concatenate([np.linspace(-90, 90, 181), incidence + _GRADED, incidence - _GRADED, own])
+    angles: F64 = np.unique(every)
     angles = angles[np.abs(angles) <= 90]
     turn = np.radians(angles)
     wi = np.stack([np.sin(turn), np.zeros_like(turn), np.cos(turn)], axis=1)
@@ -38,38 +40,33 @@ def lobe(resolved: Resolved, incidence: float, *, cosine: bool = True) -> tuple[
     toward = np.radians(incidence)
     wo = np.array([-np.sin(toward), 0.0, np.cos(toward)])  # the other way round is the same
     terms = evaluate(resolved.brdf, _shape(resolved), wo, wi).astype(np.float64)
-    made = terms @ colours(resolved)
+    made = terms @ flat_coefficients(resolved.brdf, resolved.values)
     return angles, made * np.cos(turn)[:, None] if cosine else made
 
 
-def albedo(resolved: Resolved, angles: npt.ArrayLike) -> F64:
-    """(A, 3) share of light from degrees (A,) that comes back in all, within 1 % where lobes are round."""
-    shape, weights = _shape(resolved), colours(resolved)
-    rows = []
-    for angle in np.atleast_1d(np.asarray(angles, np.float64)):
-        own = _fan(min(max(float(angle), 0.0), STEEPEST))
+def albedo(resolved: Resolved, angles: npt.ArrayLike, *, quick: bool = False) -> F64:
+    """(A, 3) share of the light from degrees (A,) that comes back in all; at 90° that of nearly 90°.
+
+    Within 0.1 %; `quick` ones, for while a hand drags, within 1 % but for Phong's lobe at grazing angles.
+    """
+    degrees = np.minimum(np.atleast_1d(np.asarray(angles, np.float64)), STEEPEST)
+    if not quick:
+        return albedo_table(resolved.brdf, resolved.values, np.radians(degrees))
+    shape, rows = _shape(resolved), []
+    for angle in degrees:
+        own = _fan(float(angle))
         light = evaluate(resolved.brdf, shape, own.wo, own.wi) * (own.wi[:, 2] * own.solid)[:, None]
-        rows.append(light.sum(axis=0, dtype=np.float64) @ weights)
-    return np.array(rows)
-
-
-def colours(resolved: Resolved) -> F64:
-    """(terms, 3) coefficients without pictures."""
-    numbers = {
-        name: np.asarray(value, np.float32)
-        for name, value in resolved.values.items()
-        if not isinstance(value, str | bool)
-    }
-    return np.asarray(resolved.brdf.coefficients(numbers), np.float64).reshape(-1, 3)
+        rows.append(light.sum(axis=0, dtype=np.float64))
+    return np.array(rows) @ flat_coefficients(resolved.brdf, resolved.values)
 
 
 def _shape(resolved: Resolved) -> F32:
     return np.atleast_1d(np.asarray(resolved.brdf.shape(resolved.values), np.float32))
 
 
-@functools.lru_cache(maxsize=256)
+@functools.lru_cache(maxsize=128)
 def _fan(angle: float) -> Fan:
     return fan(float(np.cos(np.radians(angle))))
 
 
-__all__ = ["STEEPEST", "albedo", "colours", "lobe"]
+__all__ = ["STEEPEST", "albedo", "lobe"]

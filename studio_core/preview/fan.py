@@ -9,6 +9,7 @@ light that is looked up once serves every material.
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 
 import numpy as np
@@ -65,7 +66,7 @@ def _halves() -> tuple[F64, F64]:
     """Half vectors (B, 3) and the solid angle (B,) of their cells."""
     vectors, cells = [np.array([[0.0, 0.0, 1.0]])], [np.array([2 * np.pi * (1 - np.cos(LEAST))])]
     edges = LEAST * np.exp(_STEP * np.arange(RINGS + 1))
-    for ring, (inner, outer) in enumerate(zip(edges[:-1], edges[1:], strict=True)):
+    for ring, (inner, outer) in enumerate(itertools.pairwise(edges)):
         angle = np.sqrt(inner * outer)
         count = next(many for below, many in _AROUND if angle < below)
         turn = 2 * np.pi * (np.arange(count) + 0.5 * (ring % 2)) / count

@@ -102,7 +102,7 @@ def over_disc(points: F32, at: Disc) -> F32:
     made = at.shares[0][:, None] * flat[at.corners[0]]
     for corner, share in zip(at.corners[1:], at.shares[1:], strict=True):
         made += share[:, None] * flat[corner]
-    return made.reshape(-1, *points.shape[2:])
+    return np.asarray(made.reshape(-1, *points.shape[2:]))
 
 
 def _along_u(normal: F64) -> F64:

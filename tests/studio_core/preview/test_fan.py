@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from studio_core.preview.fan import DIRECTIONS, fan
 from studio_core.brdfs.calls import evaluate
+from studio_core.preview.fan import DIRECTIONS, fan
 from studio_plugins.brdfs.blinn_phong import MODEL as BLINN
 from studio_plugins.brdfs.ggx import MODEL as GGX
 
@@ -18,8 +20,10 @@ cosines = st.floats(0.02, 1.0)
 @given(cosines)
 def test_weights_make_up_the_hemisphere(cosine: float) -> None:
     made = fan(cosine)
-    assert made.wi.shape == (DIRECTIONS, 3) and made.solid.shape == (DIRECTIONS,)
-    assert (made.solid >= 0).all() and (made.wi[:, 2] > 0).all()
+    assert made.wi.shape == (DIRECTIONS, 3)
+    assert made.solid.shape == (DIRECTIONS,)
+    assert (made.solid >= 0).all()
+    assert (made.wi[:, 2] > 0).all()
     np.testing.assert_allclose(np.linalg.norm(made.wi, axis=1), 1, atol=1e-5)
     z, solid = made.wi[:, 2].astype(float), made.solid.astype(float)
     assert solid @ z == pytest.approx(np.pi, rel=0.01)
@@ -49,7 +53,7 @@ def _dense(model: object, shape: np.ndarray, angle: float) -> np.ndarray:
     turn = 2 * np.pi * (np.arange(720) + 0.5) / 720
     wo = np.array([np.sin(angle), 0, np.cos(angle)])
     made = np.zeros(model.terms)  # type: ignore[attr-defined]
-    for inner, outer in zip(edges[:-1], edges[1:], strict=True):
+    for inner, outer in itertools.pairwise(edges):
         middle = np.sqrt(inner * outer)
         area = 4 * np.pi * (np.sin(outer / 2) ** 2 - np.sin(inner / 2) ** 2) / len(turn)
         ring = np.sin(middle) * np.stack([np.cos(turn), np.sin(turn)], 1)
