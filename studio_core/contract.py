@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from studio_core.params import Value
+from studio_core.scene.geometry import Table
 from studio_core.scene.nodes import Material, MeshObject, Node, Scene
 
 if TYPE_CHECKING:
@@ -109,6 +110,23 @@ class SampledBrdf(Brdf, Protocol):
     @property
     def density(self) -> int:
         """Address of `density`."""
+        ...
+
+
+class TabulatedBrdf(Brdf, Protocol):
+    """A reflectance model that reads measured tables of its material.
+
+    `shape` alone is that of a plain stand-in, for whoever has no material. Where a table is missing or does
+    not fit, the material is shown as matte grey and the reason is said.
+    """
+
+    tables: tuple[str, ...]
+
+    def shape_of(self, values: Mapping[str, Value], tables: Mapping[str, Table]) -> npt.NDArray[np.float32]:
+        """(n,) as `shape`, naming each table by `studio_core.kernels.tables.reference`.
+
+        Raises InputError, one sentence, when a table does not fit. Asked at every edit: it must be quick.
+        """
         ...
 
 
@@ -239,4 +257,5 @@ __all__ = [
     "SampledBrdf",
     "Services",
     "ShadingBackend",
+    "TabulatedBrdf",
 ]

@@ -274,4 +274,5 @@ def _parts(scene: Scene) -> dict[int, int]:
                 found[id(heavy)] = heavy.nbytes
     for material in scene.materials.values():
         found |= {id(t.image): t.image.nbytes for t in material.textures.values()}
+        found |= {id(table): table.nbytes for table in material.tables.values()}
     return found

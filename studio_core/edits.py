@@ -17,7 +17,7 @@ import numpy as np
 from studio_core.arrays import frozen_map
 from studio_core.errors import EditError, InputError
 from studio_core.params import ParamInfo, Value, check, param_infos
-from studio_core.scene.geometry import Geometry, Image, Texture
+from studio_core.scene.geometry import Geometry, Image, Table, Texture
 from studio_core.scene.nodes import Material, MaterialId, MeshObject, Node, NodeId, Scene, new_id
 from studio_core.scene.transform import IDENTITY, Transform
 
@@ -266,6 +266,24 @@ class SetTexture:
         if self.texture is not None:
             textures[self.parameter] = self.texture
         return scene.with_materials(dataclasses.replace(old, textures=frozen_map(textures)))
+
+
+@dataclass(frozen=True)
+class SetTable:
+    """Measured numbers for a material by the model's name for them, or none."""
+
+    material: MaterialId
+    slot: str
+    table: Table | None
+    label: str = "Change measurement"
+
+    def __call__(self, scene: Scene) -> Scene:
+        old = scene.material(self.material)
+        tables = {**old.tables}
+        tables.pop(self.slot, None)
+        if self.table is not None:
+            tables[self.slot] = self.table
+        return scene.with_materials(dataclasses.replace(old, tables=frozen_map(tables)))
 
 
 def duplicate(

@@ -7,12 +7,13 @@ from collections.abc import Callable
 from random import Random
 from typing import Any
 
+import numpy as np
 from scenes import cube, floor, sky
 
 from studio_core import edits
 from studio_core.arrays import frozen_map
 from studio_core.edits import Edit
-from studio_core.scene.geometry import Texture
+from studio_core.scene.geometry import Table, Texture
 from studio_core.scene.nodes import (
     AreaLamp,
     Camera,
@@ -206,6 +207,11 @@ def _set_texture(dice: Dice) -> Edit:
     return edits.SetTexture(dice.material(), "base_color", dice.rng.choice((None, texture)))
 
 
+def _set_table(dice: Dice) -> Edit:
+    table = Table(np.full((2, 1, 3, 3), dice.rng.uniform(0.0, 0.3), np.float32), "Felt")
+    return edits.SetTable(dice.material(), "measurement", dice.rng.choice((None, table)))
+
+
 def _compound(dice: Dice) -> Edit:
     first = edits.Add((Group(id=f"{dice.fresh}-a"),))
     then = dataclasses.replace(dice, scene=first(dice.scene), fresh=f"{dice.fresh}c")
@@ -232,6 +238,7 @@ MAKERS: list[Callable[[Dice], Edit]] = [
     *[_remove_material] * 2,
     _set_material,
     _set_texture,
+    _set_table,
     _compound,
     _replace_by_another_kind,
 ]

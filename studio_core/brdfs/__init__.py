@@ -1,1 +1,1 @@
-"""Reflectance models as a whole: called from Python, their albedo, and checks of what they promise."""
+"""Reflectance models as a whole: called from Python, their albedo, what they promise, and measurements."""

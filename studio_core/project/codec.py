@@ -20,7 +20,7 @@ from studio_core.project.fields import Record
 from studio_core.project.memo import Memo
 from studio_core.scene import nodes
 from studio_core.scene.capture import Capture
-from studio_core.scene.geometry import Geometry, Image
+from studio_core.scene.geometry import Geometry, Image, Table
 from studio_core.scene.nodes import Material, Node, Scene
 from studio_core.scene.room import Room
 
@@ -80,9 +80,14 @@ class _Outward:
         self.blobs.append(Blob(ref, image.pixels, squeeze=True))
         return {"pixels": ref.json(), "encoding": image.encoding}
 
+    def table_json(self, table: Table) -> Any:
+        ref = table_ref(table)
+        self.blobs.append(Blob(ref, table.values, squeeze=True))
+        return {"values": ref.json(), "name": table.name}
+
 
 class Inward:
-    """Makes scene values from JSON; equal meshes and pictures become one object.
+    """Makes scene values from JSON; equal meshes, pictures and tables become one object.
 
     `fetch` gives the checked array of a reference.
     """
@@ -91,6 +96,7 @@ class Inward:
         self._fetch = fetch
         self._geometries: dict[tuple[tuple[str, ArrayRef], ...], Geometry] = {}
         self._images: dict[tuple[ArrayRef, str], Image] = {}
+        self._tables: dict[tuple[ArrayRef, str], Table] = {}
 
     def geometry(self, value: Any, part: str) -> Geometry:
         """The mesh of a JSON object of array references."""
@@ -134,6 +140,21 @@ class Inward:
             except ValueError as error:
                 raise ProjectError(f"{part} is damaged: {error}") from None
         return self._images[key]
+
+    def table(self, value: Any, part: str) -> Table:
+        """The table of a JSON object with its numbers' reference."""
+        if not isinstance(value, dict) or set(value) != {"values", "name"} or type(value["name"]) is not str:
+            raise ProjectError(f"{part} is damaged: no table")
+        ref = parse_ref(value["values"], part, ("<f4",), (None, None, None, None))
+        key = (ref, value["name"])
+        if key not in self._tables:
+            if 0 in ref.shape:
+                raise ProjectError(f"{part} is damaged: a table of shape {ref.shape}")
+            try:
+                self._tables[key] = Table(self._fetch(ref, part, True), value["name"])
+            except ValueError as error:
+                raise ProjectError(f"{part} is damaged: {error}") from None
+        return self._tables[key]
 
     def item(self, value: dict[str, Any], part: str) -> Node | Material:
         """The node or material of a parsed item."""
@@ -205,5 +226,6 @@ def scene_digest(scene: Scene) -> str:
 # What follows remembers pure results for as long as the values live; nothing else is shared.
 geometry_refs: Memo[dict[str, ArrayRef]] = Memo(_geometry_refs)
 image_ref: Memo[ArrayRef] = Memo(lambda image: array_ref(image.pixels))
+table_ref: Memo[ArrayRef] = Memo(lambda table: array_ref(table.values))
 item_hash: Memo[str] = Memo(lambda item: text_hash(encode_item(item)[0]))
 known_digest: Memo[str] = Memo(lambda scene: scene_form(scene).digest)

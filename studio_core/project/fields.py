@@ -17,7 +17,7 @@ import numpy as np
 from studio_core.arrays import frozen_map
 from studio_core.errors import ProjectError
 from studio_core.params import Value, nearest, param_infos
-from studio_core.scene.geometry import Geometry, Image
+from studio_core.scene.geometry import Geometry, Image, Table
 
 Dataclass = TypeVar("Dataclass")
 
@@ -31,11 +31,17 @@ class Heavy(Protocol):
     def image_json(self, image: Image) -> Any:
         """Reference to a picture's pixels."""
 
+    def table_json(self, table: Table) -> Any:
+        """Reference to a table's numbers, and its name."""
+
     def geometry(self, value: Any, part: str) -> Geometry:
         """The mesh behind the references."""
 
     def image(self, value: Any, part: str) -> Image:
         """The picture behind the reference."""
+
+    def table(self, value: Any, part: str) -> Table:
+        """The table behind the reference."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -92,6 +98,8 @@ NUMBER = Codec(_write_number, _read_number)
 INTEGER, FLAG, TEXT = (Codec(check, check) for check in (_integer, _flag, _text))
 GEOMETRY = Codec(lambda v, heavy, _: heavy.geometry_json(v), lambda v, heavy, part: heavy.geometry(v, part))
 IMAGE = Codec(lambda v, heavy, _: heavy.image_json(v), lambda v, heavy, part: heavy.image(v, part))
+
+TABLE = Codec(lambda v, heavy, _: heavy.table_json(v), lambda v, heavy, part: heavy.table(v, part))
 
 
 def _write_value(value: Any, heavy: Heavy, part: str) -> Any:
@@ -224,6 +232,7 @@ _ATOMS: dict[Any, Codec] = {
     str: TEXT,
     Geometry: GEOMETRY,
     Image: IMAGE,
+    Table: TABLE,
 }
 
 

@@ -1,4 +1,4 @@
-"""Meshes and pictures: the heavy, shared, read-only parts of a scene."""
+"""Meshes, pictures and tables: the heavy, shared, read-only parts of a scene."""
 
 from __future__ import annotations
 
@@ -115,3 +115,32 @@ class Texture:
     image: Image
     scale: tuple[float, float] = (1.0, 1.0)
     offset: tuple[float, float] = (0.0, 0.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Table:
+    """Numbers a reflectance model reads: (A, B, C, channels) float32, and where they are from.
+
+    Raises ValueError when the shape does not fit or a number is not finite.
+    """
+
+    values: npt.NDArray[np.float32]
+    name: str = ""
+
+    def __post_init__(self) -> None:
+        made = readonly(self.values, np.float32, -1, -1, -1, -1)
+        if 0 in made.shape:
+            raise ValueError(f"a table of shape {made.shape} cannot be used")
+        if not (np.isfinite(made.min()) and np.isfinite(made.max())):
+            raise ValueError("a table must be finite")
+        object.__setattr__(self, "values", made)
+
+    @cached_property
+    def key(self) -> str:
+        """Content hash of the numbers."""
+        return content_hash(self.values)
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of the numbers."""
+        return int(self.values.nbytes)

@@ -16,7 +16,7 @@ from studio_core.arrays import frozen_map
 from studio_core.colour import kelvin
 from studio_core.errors import EditError
 from studio_core.params import Colour, Value, param
-from studio_core.scene.geometry import Geometry, Image, Texture
+from studio_core.scene.geometry import Geometry, Image, Table, Texture
 from studio_core.scene.transform import IDENTITY, Transform, axis_angle, multiply
 
 NodeId = str
@@ -32,11 +32,12 @@ def new_id(prefix: str) -> str:
 
 @dataclass(frozen=True, kw_only=True)
 class Material:
-    """A BRDF of the registry by name, its parameters, and textures by parameter name.
+    """A BRDF of the registry by name, its parameters, textures by parameter name, and measured tables.
 
-    Values that are not given have the model's defaults. Under `opacity` 0.5 the surface casts no shadow;
-    under 1 it is drawn blended. What `catches` shadows belongs to the photographed room: it shows what is
-    behind it, times the light it gets over the light it would get if nothing stood there.
+    Values that are not given have the model's defaults; tables that the model does not ask for are kept.
+    Under `opacity` 0.5 the surface casts no shadow; under 1 it is drawn blended. What `catches` shadows
+    belongs to the photographed room: it shows what is behind it, times the light it gets over the light it
+    would get if nothing stood there.
     """
 
     id: MaterialId
@@ -44,6 +45,7 @@ class Material:
     model: str = "lambert"
     values: Mapping[str, Value] = field(default_factory=frozen_map)
     textures: Mapping[str, Texture] = field(default_factory=frozen_map)
+    tables: Mapping[str, Table] = field(default_factory=frozen_map)
     opacity: float = param(1.0, "Opacity", "Below 0.5 the surface casts no shadow", low=0.0, high=1.0)
     catches: bool = param(
         False, "Catches shadows", "Shows the background, darker where furniture takes light away from it"

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, TypeAlias, Union
 import numpy as np
 import numpy.typing as npt
 
-from studio_core.scene.geometry import Geometry
+from studio_core.scene.geometry import Geometry, Table
 from studio_core.scene.nodes import Environment, Light, MaterialId, NodeId
 from studio_core.scene.transform import Transform
 from studio_core.session import View
@@ -100,13 +100,17 @@ class Casters:
 
 @dataclass(frozen=True)
 class Shapes:
-    """BRDF kernels per material: address, number of terms, and where its shape starts in `data`."""
+    """BRDF kernels per material: address, number of terms, and where its shape starts in `data`.
+
+    `tables` are those that shapes name, kept alive.
+    """
 
     address: npt.NDArray[np.int64]
     terms: npt.NDArray[np.int64]
     offset: npt.NDArray[np.int64]
     data: F32
     problems: tuple[str, ...] = ()
+    tables: tuple[Table, ...] = ()
 
     @property
     def width(self) -> int:

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import numpy.typing as npt
 
-from studio_core.contract import Brdf, Registry
+from studio_core.brdfs.bound import Bound, bound
+from studio_core.contract import Brdf, Registry, TabulatedBrdf
 from studio_core.errors import InputError, LucarneError, PluginError
 from studio_core.params import Value, check, defaults, param_infos
-from studio_core.scene.geometry import Image, Texture
+from studio_core.scene.geometry import Image, Table, Texture
 from studio_core.scene.nodes import Material, MaterialId, Scene
 from studio_core.shading.artifacts import TERMS, Shapes
 
@@ -21,12 +22,16 @@ FALLBACK = "lambert"
 
 @dataclass(frozen=True)
 class Resolved:
-    """A material with its model and all parameter values; `problem` says what had to be replaced."""
+    """A material with its model and all parameter values; `problem` says what had to be replaced.
+
+    `tables` are those that the model reads; whoever keeps a shape of it keeps them alive.
+    """
 
     brdf: Brdf
     values: Mapping[str, Value]
     textures: Mapping[str, Texture]
     problem: str = ""
+    tables: tuple[Table, ...] = ()
 
 
 def resolve(material: Material, registry: Registry) -> Resolved:
@@ -58,7 +63,26 @@ def resolve(material: Material, registry: Registry) -> Resolved:
             mean = linear_rgb(texture.image).mean(axis=(0, 1), dtype=np.float64)
             values[name] = _times(values[name], mean)
             problem = f"{material.name}: the textures of one material lie alike; {name} is shown as its mean"
-    return Resolved(brdf, values, textures, problem)
+    if not getattr(brdf, "tables", ()):
+        return Resolved(brdf, values, textures, problem)
+    try:
+        made = _with_tables(brdf, material, values)
+        return Resolved(made, values, textures, problem, tuple(made.tables.values()))
+    except LucarneError as error:
+        problem = f"{material.name}: {error}; shown as matte grey"
+        brdf = registry.brdf(FALLBACK)
+        return Resolved(brdf, defaults(brdf.Params), {}, problem)
+
+
+def _with_tables(brdf: Brdf, material: Material, values: Mapping[str, Value]) -> Bound:
+    """The model bound to the material's tables; InputError when they are missing or do not fit."""
+    tabulated = cast(TabulatedBrdf, brdf)
+    missing = [name for name in tabulated.tables if name not in material.tables]
+    if missing:
+        raise InputError(f"it has no {' and no '.join(missing)}")
+    made = bound(tabulated, material.tables)
+    made.shape(values)
+    return made
 
 
 def _times(value: Value, colour: npt.NDArray[np.float64]) -> Value:
@@ -73,6 +97,7 @@ def shapes(scene: Scene, materials: Sequence[MaterialId], registry: Registry) ->
     """The table of BRDF kernels for `materials`."""
     address, terms, offset, problems = [], [], [], []
     data: list[npt.NDArray[np.float32]] = []
+    tables: list[Table] = []
     length = 0
     for material in materials:
         resolved = resolve(scene.material(material), registry)
@@ -84,11 +109,12 @@ def shapes(scene: Scene, materials: Sequence[MaterialId], registry: Registry) ->
         offset.append(length)
         data.append(shape)
         length += len(shape)
+        tables += resolved.tables
         if resolved.problem:
             problems.append(resolved.problem)
     flat = np.concatenate([*data, np.zeros(1, np.float32)])
     made = (np.array(address, np.int64), np.array(terms, np.int64), np.array(offset, np.int64))
-    return Shapes(*made, flat, tuple(problems))
+    return Shapes(*made, flat, tuple(problems), tuple(tables))
 
 
 def same_shapes(a: Shapes, b: Shapes) -> bool:

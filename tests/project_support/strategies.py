@@ -9,7 +9,7 @@ import numpy as np
 from hypothesis import strategies as st
 
 from studio_core.arrays import frozen_map
-from studio_core.scene.geometry import Geometry, Image, Texture
+from studio_core.scene.geometry import Geometry, Image, Table, Texture
 from studio_core.scene.nodes import (
     AreaLamp,
     Camera,
@@ -70,6 +70,13 @@ def images(draw: st.DrawFn) -> Image:
 
 
 @st.composite
+def tables(draw: st.DrawFn) -> Table:
+    seed = np.random.default_rng(draw(st.integers(0, 2**32)))
+    shape = tuple(draw(st.integers(1, 5)) for _ in range(4))
+    return Table((seed.standard_normal(shape) * 1e3).astype(np.float32), draw(TEXTS))
+
+
+@st.composite
 def materials(draw: st.DrawFn, ident: str, pictures: Sequence[Image]) -> Material:
     laid = st.builds(Texture, st.sampled_from(pictures), st.tuples(FLOATS, FLOATS), st.tuples(FLOATS, FLOATS))
     return Material(
@@ -78,6 +85,7 @@ def materials(draw: st.DrawFn, ident: str, pictures: Sequence[Image]) -> Materia
         model=draw(st.sampled_from(["lambert", "ggx", "never-heard-of"])),
         values=frozen_map(draw(st.dictionaries(TEXTS, VALUES, max_size=4))),
         textures=frozen_map(draw(st.dictionaries(TEXTS, laid, max_size=2))),
+        tables=frozen_map(draw(st.dictionaries(TEXTS, tables(), max_size=2))),
         opacity=draw(st.floats(0, 1)),
     )
 

@@ -14,6 +14,7 @@ plugin = Plugin(
             "phong": f"{_HERE}.phong:MODEL",
             "blinn-phong": f"{_HERE}.blinn_phong:MODEL",
             "ggx": f"{_HERE}.ggx:MODEL",
+            "measured": f"{_HERE}.measured:MODEL",
         }
     },
 )

@@ -21,7 +21,7 @@ from studio_core.project import blobs, codec, pages
 from studio_core.project.canonical import dumps, loads, text_hash
 from studio_core.project.memo import Memo
 from studio_core.project.validate import check_scene
-from studio_core.scene.geometry import Geometry, Image, Texture
+from studio_core.scene.geometry import Geometry, Image, Table, Texture
 from studio_core.scene.nodes import (
     Camera,
     Environment,
@@ -105,6 +105,23 @@ def test_equal_meshes_and_pictures_become_one_object() -> None:
     )
     assert one.geometry is two.geometry
     assert paint.textures["colour"].image is light.image
+
+
+def test_equal_tables_become_one_object_and_damaged_ones_are_refused() -> None:
+    values = np.random.default_rng(0).random((3, 4, 5, 3), dtype=np.float32)
+    measured = dataclasses.replace(PAINT, tables=frozen_map({"measurement": Table(values, "Felt")}))
+    other = dataclasses.replace(measured, id="b", tables=frozen_map({"x": Table(values.copy(), "Felt")}))
+    one, two = back(measured, other)
+    assert one.tables["measurement"] is two.tables["x"]
+    assert one.tables["measurement"].values.tobytes() == values.tobytes()
+    assert (one.tables["measurement"].name, one.tables["measurement"].key) == ("Felt", Table(values).key)
+    text = codec.encode_item(measured)[0]
+    for old, new in (('"name":"Felt"', '"name":1'), ('"name":"Felt",', ""), ("[3,4,5,3]", "[3,4,15]")):
+        assert old in text
+        with pytest.raises(ProjectError, match="damaged"):
+            codec.Inward(lambda *_: values).item(loads(text.replace(old, new), "an item"), "an item")
+    with pytest.raises(ProjectError, match="finite"):
+        codec.Inward(lambda *_: values * np.float32(np.inf)).item(loads(text, "an item"), "an item")
 
 
 def test_unknown_models_and_parameters_survive() -> None:

@@ -1,0 +1,201 @@
+"""Measured reflectance: a table over half and difference angles, as the MERL database's.
+
+f_r = tint · s · table(θ_h, θ_d, φ_d), trilinear between the middles of the table's cells
+(`studio_core.brdfs.half_difference`; Rusinkiewicz 1998, Matusik et al. 2003); s = min(s(ω_i), s(ω_o)).
+Where a measurement returns more light than arrives, as real ones do near grazing, s(ω) = 1 / albedo(ω),
+elsewhere 1: the albedo stays at most 1, f_r is reciprocal, pairs of sound directions keep what was measured.
+Terms: b0, b1, b2 = red, green and blue of the table; c0 = (tint red, 0, 0), …
+
+==============  ========  =====  ============================================================
+parameter       range     unit   meaning
+==============  ========  =====  ============================================================
+tint            0…1       –      what the measured colours are multiplied with, linear Rec.709
+keep_energy     yes/no    –      scale directions that return more light than arrives
+==============  ========  =====  ============================================================
+
+The table is the material's `measurement`. Without any material the stand-in is a matte grey of 50 %.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, cast
+
+import numpy as np
+import numpy.typing as npt
+
+from studio_core.brdfs.calls import evaluate as call
+from studio_core.contract import Brdf
+from studio_core.errors import InputError
+from studio_core.jit import batch_function
+from studio_core.kernels.brdf import HALF, ONE, SIGNATURE, ZERO, carray
+from studio_core.kernels.tables import REFERENCE, reference, referred
+from studio_core.params import Colour, Value, param
+from studio_core.scene.geometry import Table
+
+F32 = npt.NDArray[np.float32]
+F64 = npt.NDArray[np.float64]
+
+SLOT = "measurement"
+CURVE = 64
+"""Directions of the scale s, even in θ."""
+_MARGIN = 0.999
+_MOST_KEPT = 64
+_TO_HALF = np.float32(np.sqrt(2 / np.pi))
+_TO_DIFFERENCE = np.float32(2 / np.pi)
+_TO_AZIMUTH = np.float32(1 / np.pi)
+_PI = np.float32(np.pi)
+_UPRIGHT = np.float32(1e-12)
+_TO_CURVE = np.float32((CURVE - 1) * 2 / np.pi)
+
+
+@dataclass(frozen=True)
+class Params:
+    """Parameters of `Measured`."""
+
+    tint: Colour = param((1.0, 1.0, 1.0), "Tint", "Multiplies the measured colours", low=0.0, high=1.0)
+    keep_energy: bool = param(
+        True, "Keep energy", "Scale directions in which the measurement returns more light than arrives"
+    )
+
+
+@batch_function(SIGNATURE)
+def evaluate(shape: Any, wo: Any, count: int, wi: Any, out: Any) -> None:
+    """See `studio_core.contract.Brdf`. shape: reference of the table, then s at CURVE directions."""
+    s = carray(shape, REFERENCE + CURVE)
+    table = referred(s)
+    half, difference, azimuth = int(s[4]), int(s[5]), int(s[6])
+    o = carray(wo, 3)
+    ox, oy, oz = o[0], o[1], o[2]
+    directions = carray(wi, 3 * count)
+    x, y, z = directions[:count], directions[count : 2 * count], directions[2 * count :]
+    terms = carray(out, 3 * count)
+    at = _TO_CURVE * np.arctan2(np.sqrt(ox * ox + oy * oy), oz)
+    first = min(max(int(at), 0), CURVE - 2)
+    part = at - np.float32(first)
+    seen = s[REFERENCE + first] * (ONE - part) + s[REFERENCE + first + 1] * part
+    for k in range(count):
+        if not (oz > ZERO and z[k] > ZERO):
+            terms[k] = terms[count + k] = terms[2 * count + k] = ZERO
+            continue
+        at = _TO_CURVE * np.arctan2(np.sqrt(x[k] * x[k] + y[k] * y[k]), z[k])
+        first = min(max(int(at), 0), CURVE - 2)
+        part = at - np.float32(first)
+        scale = min(seen, s[REFERENCE + first] * (ONE - part) + s[REFERENCE + first + 1] * part)
+
+        hx, hy, hz = x[k] + ox, y[k] + oy, z[k] + oz
+        ex, ey, ez = x[k] - ox, y[k] - oy, z[k] - oz
+        flat = hx * hx + hy * hy
+        length = np.sqrt(flat + hz * hz)
+        across, along = hx * ey - hy * ex, -ez * length
+        if flat < _UPRIGHT:
+            across, along = ey, ex
+        turn = np.arctan2(across, along)
+        if turn < ZERO:
+            turn += _PI
+        # in cells, counted from the middle of the first
+        a = _TO_HALF * np.sqrt(np.arctan2(np.sqrt(flat), hz)) * np.float32(half) - HALF
+        b = _TO_DIFFERENCE * np.arctan2(np.sqrt(ex * ex + ey * ey + ez * ez), length)
+        b = b * np.float32(difference) - HALF
+        c = _TO_AZIMUTH * turn * np.float32(azimuth) - HALF
+        a = min(max(a, ZERO), np.float32(half - 1))
+        b = min(max(b, ZERO), np.float32(difference - 1))
+        c = max(c, -HALF)
+        i, j, low = int(a), int(b), int(np.floor(c))
+        u, v, w = a - np.float32(i), b - np.float32(j), c - np.float32(low)
+        i1, j1 = min(i + 1, half - 1), min(j + 1, difference - 1)
+        high = (low + 1) % azimuth
+        low = (low + azimuth) % azimuth
+        red = green = blue = ZERO
+        for corner in range(8):
+            row = i1 if corner & 4 else i
+            column = j1 if corner & 2 else j
+            depth = high if corner & 1 else low
+            weight = u if corner & 4 else ONE - u
+            weight *= v if corner & 2 else ONE - v
+            weight *= w if corner & 1 else ONE - w
+            place = ((row * difference + column) * azimuth + depth) * 3
+            red += weight * table[place]
+            green += weight * table[place + 1]
+            blue += weight * table[place + 2]
+        terms[k] = scale * red
+        terms[count + k] = scale * green
+        terms[2 * count + k] = scale * blue
+
+
+class Measured:
+    """See the module; satisfies `studio_core.contract.TabulatedBrdf`."""
+
+    id = "measured"
+    label = "Measured"
+    Params = Params
+    terms = 3
+    textures: tuple[str, ...] = ("tint",)
+    tables: tuple[str, ...] = (SLOT,)
+
+    def __init__(self) -> None:
+        self._plain = Table(np.full((2, 2, 2, 3), 0.5 / np.pi, np.float32), "grey")
+        self._albedos: dict[str, F64] = {}
+
+    @property
+    def address(self) -> int:
+        """Address of `evaluate`."""
+        return evaluate.address
+
+    def shape(self, values: Mapping[str, Value]) -> F32:
+        """(80,) of the stand-in."""
+        return self.shape_of(values, {SLOT: self._plain})
+
+    def shape_of(self, values: Mapping[str, Value], tables: Mapping[str, Table]) -> F32:
+        """(80,): reference of the table, and s at CURVE directions."""
+        table = tables[SLOT]
+        if table.values.shape[3] != 3 or table.values.min() < 0:
+            raise InputError("its measurement is no table of reflectances in red, green and blue")
+        curve = np.ones(CURVE)
+        if values["keep_energy"]:
+            most = self.albedo(table).max(axis=1)
+            curve = np.where(most > _MARGIN, _MARGIN / np.maximum(most, _MARGIN), 1.0)
+        return np.concatenate([reference(table), curve.astype(np.float32)])
+
+    def coefficients(self, values: Mapping[str, npt.NDArray[np.floating[Any]]]) -> F32:
+        """(..., 3, 3): the tint on the diagonal."""
+        tint: F32 = np.clip(np.asarray(values["tint"], np.float32), 0, 1)
+        return tint[..., None, :] * np.eye(3, dtype=np.float32)
+
+    def albedo(self, table: Table) -> F64:
+        """(CURVE, 3) share of light that comes back, at directions even in θ from above to grazing.
+
+        Over half vectors, dω_i = 4 (ω_o·h) dω_h (Walter et al. 2007, eq. 14), one row of quadrature a cell.
+        """
+        if table.key not in self._albedos:
+            while len(self._albedos) >= _MOST_KEPT:
+                self._albedos.pop(next(iter(self._albedos)))
+            self._albedos[table.key] = self._measured_albedo(table)
+        return self._albedos[table.key]
+
+    def _measured_albedo(self, table: Table) -> F64:
+        shape = np.concatenate([reference(table), np.ones(CURVE, np.float32)])
+        rows, turns = 2 * max(table.values.shape[0], 45), 48
+        edge = np.linspace(0, 1, rows + 1)
+        theta = np.pi / 2 * (edge[1:] / 2 + edge[:-1] / 2) ** 2
+        weight = np.cos(np.pi / 2 * edge[:-1] ** 2) - np.cos(np.pi / 2 * edge[1:] ** 2)
+        phi = 2 * np.pi * (np.arange(turns) + 0.5) / turns
+        flat = np.sin(theta)[:, None]
+        h = np.stack(
+            np.broadcast_arrays(flat * np.cos(phi), flat * np.sin(phi), np.cos(theta)[:, None]), -1
+        ).reshape(-1, 3)
+        share = np.repeat(weight, turns) * 2 * np.pi / turns
+        made = np.zeros((CURVE, 3))
+        for k in range(CURVE):
+            up = max(np.cos(np.pi / 2 * k / (CURVE - 1)), 1e-4)
+            wo = np.array([np.sqrt(1 - up * up), 0.0, up])
+            cosine = h @ wo
+            wi = 2 * cosine[:, None] * h - wo
+            used = (cosine > 0) & (wi[:, 2] > 0)
+            measure = (4 * cosine * share * wi[:, 2])[used]
+            made[k] = measure @ call(cast(Brdf, self), shape, wo, wi[used]).astype(np.float64)
+        return made
+
+
+MODEL = Measured()
