@@ -1,0 +1,1 @@
+"""Materials outside of scenes: files of one material, and the shelf that finds them."""
