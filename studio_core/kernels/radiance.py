@@ -33,6 +33,18 @@ def frame(nx: float, ny: float, nz: float, out: F64) -> None:
 
 
 @kernel
+def surface_frame(normal: F32, tangent: F32, out: F64) -> None:
+    """Rows t, b, n about a unit normal; t is a tangent (x, y, z, s) of `scene.tangents`, b = s · n × t."""
+    nx, ny, nz = float(normal[0]), float(normal[1]), float(normal[2])
+    tx, ty, tz, sense = float(tangent[0]), float(tangent[1]), float(tangent[2]), float(tangent[3])
+    out[0, 0], out[0, 1], out[0, 2] = tx, ty, tz
+    out[1, 0] = sense * (ny * tz - nz * ty)
+    out[1, 1] = sense * (nz * tx - nx * tz)
+    out[1, 2] = sense * (nx * ty - ny * tx)
+    out[2, 0], out[2, 1], out[2, 2] = nx, ny, nz
+
+
+@kernel
 def local_view(position: F32, eye: F32, axes: F64, wo: F32) -> None:
     """Direction towards the eye in the shading frame, at least `LOWEST_VIEW` above the surface."""
     dx = float(eye[0]) - float(position[0])
@@ -74,6 +86,7 @@ def environment_terms(
     points: I64,
     positions: F32,
     normals: F32,
+    tangents: F32,
     material: I32,
     eye: F32,
     bits: npt.NDArray[np.uint64],
@@ -100,7 +113,7 @@ def environment_terms(
     sums = np.empty((out_terms.shape[1], 3))
     for row in range(start, stop):
         p = points[row]
-        frame(normals[p, 0], normals[p, 1], normals[p, 2], axes)
+        surface_frame(normals[p], tangents[p], axes)
         local_view(positions[p], eye, axes, wo)
         m = material[p]
         shape = shapes[offset[m] :]
@@ -170,6 +183,7 @@ def lamp_terms(
     points: I64,
     positions: F32,
     normals: F32,
+    tangents: F32,
     material: I32,
     eye: F32,
     to_lamp: F32,
@@ -202,7 +216,7 @@ def lamp_terms(
     for row in range(start, stop):
         p = points[row]
         towards, given = to_lamp[row if own_way else 0], weight[row if own_weight else 0]
-        frame(normals[p, 0], normals[p, 1], normals[p, 2], axes)
+        surface_frame(normals[p], tangents[p], axes)
         local_view(positions[p], eye, axes, wo)
         m = material[p]
         count = 0
@@ -237,4 +251,4 @@ def lamp_terms(
         out_irradiance[p, 2] += blue
 
 
-__all__ = ["BATCH", "environment_terms", "frame", "lamp_terms", "local_view"]
+__all__ = ["BATCH", "environment_terms", "frame", "lamp_terms", "local_view", "surface_frame"]

@@ -8,6 +8,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from studio_core.scene.surface import Surface
+from studio_core.scene.tangents import mirrored, orientation
 from studio_core.scene.topology import Bools, Floats, Ints, components, ranks
 
 NONE = -1
@@ -47,7 +48,8 @@ def fan(surface: Surface, crease_degrees: float) -> Fan:
 
     Corners around a point share a vertex across every edge that is smooth there: same material slot, same
     uv, and file normals within 1 degree, or, without file normals, faces that meet at less than the crease
-    angle. File normals that look to the other side are turned to the face's.
+    angle. File normals that look to the other side are turned to the face's. Where the picture turns back
+    as a mirror image, each half has a vertex of the same normal: their tangents run against each other.
     """
     count = len(surface.faces)
     rear = np.flatnonzero(surface.two_sided)
@@ -79,6 +81,7 @@ def fan(surface: Surface, crease_degrees: float) -> Fan:
     weight = np.ones(3 * len(corners)) if given else _corner_weights(surface.points, corners, doubled[face])
     group, mean = _means(group, normals.reshape(-1, 3), weight)
     group, mean = _split_hidden(group, mean, normals, flat)
+    group, mean = _split_mirrored(group, mean, np.repeat(orientation(uvs) * side, 3))
 
     first, vertex = ranks(group)
     triples = vertex.reshape(-1, 3)
@@ -166,3 +169,14 @@ def _split_hidden(group: Ints, mean: Floats, normals: Floats, flat: Floats) -> t
     group = group.copy()
     group[hidden] = len(mean) + np.arange(len(hidden))
     return group, np.concatenate([mean, np.where(facing[:, None], own, face_normal[hidden])])
+
+
+def _split_mirrored(group: Ints, mean: Floats, hand: Ints) -> tuple[Ints, Floats]:
+    """Corners that lie mirrored in the picture leave groups of others that do not."""
+    leaving = np.flatnonzero(mirrored(group, hand))
+    if not len(leaving):
+        return group, mean
+    left, number = np.unique(group[leaving], return_inverse=True)
+    group = group.copy()
+    group[leaving] = len(mean) + number.reshape(-1)
+    return group, np.concatenate([mean, mean[left]])

@@ -16,6 +16,7 @@ from studio_core.scene.bisection import longest, split
 from studio_core.scene.geometry import Geometry
 from studio_core.scene.normals import NONE, Fan, fan
 from studio_core.scene.surface import surface
+from studio_core.scene.tangents import vertex_tangents
 from studio_core.scene.tessellate import SLACK, Estimate, subdivide
 from studio_core.scene.topology import Floats, Ints, edges, ranks
 
@@ -35,12 +36,12 @@ class ShadingMesh:
     """Shading vertices and faces of one geometry in its own frame, metres. All arrays are read-only.
 
     A vertex belongs to one point, one material slot, one smooth group and one side. For each vertex:
-    positions (V, 3); normals (V, 3) unit shading normals towards the vertex' own side; geometric (V, 3) unit,
-    area-weighted over its faces; inset (V, 3), 1e-3 of the way to the mean centroid of its faces and never
-    below the tangent plane, to start rays at position + inset + ε·normal; area (V,), a third of its faces';
-    uvs (V, 2) or None; slot (V,); side (V,) +1 front, -1 back; welded (V,) number of its point: vertices of
-    equal number stand at the same place; parents (V, 2): the two ends that `refine` put it between, or twice
-    itself.
+    positions (V, 3); normals (V, 3) unit shading normals towards the vertex' own side; tangents (V, 4) along
+    the picture's u with its handedness (see `scene.tangents`); geometric (V, 3) unit, area-weighted over its
+    faces; inset (V, 3), 1e-3 of the way to the mean centroid of its faces and never below the tangent plane,
+    to start rays at position + inset + ε·normal; area (V,), a third of its faces'; uvs (V, 2) or None; slot
+    (V,); side (V,) +1 front, -1 back; welded (V,) number of its point: vertices of equal number stand at the
+    same place; parents (V, 2): the two ends that `refine` put it between, or twice itself.
     faces (F, 3) front vertices; back_faces (F, 3), corner by corner at the same points, the vertices to use
     where face f is seen from behind, or NO_BACK: a closed part has no back. source_face (F,) index into
     geometry.faces; slots (F,). `edge` is the length that no edge exceeds.
@@ -48,6 +49,7 @@ class ShadingMesh:
 
     positions: F32
     normals: F32
+    tangents: F32
     geometric: F32
     inset: F32
     area: F32
@@ -64,7 +66,7 @@ class ShadingMesh:
 
     def __post_init__(self) -> None:
         types = {
-            np.float32: ("positions", "normals", "geometric", "inset", "area"),
+            np.float32: ("positions", "normals", "tangents", "geometric", "inset", "area"),
             np.uint16: ("slot", "slots"),
             np.uint32: ("welded", "parents", "faces", "back_faces", "source_face"),
             np.int8: ("side",),
@@ -142,10 +144,20 @@ def _in_order(mesh: Fan) -> Fan:
 def _finished(mesh: Fan, edge: float, has_uvs: bool) -> ShadingMesh:
     count = len(mesh.weld)
     geometric, inset, area = _around(mesh)
+    seen = np.flatnonzero(mesh.back[:, 0] != NONE)
+    tangents = vertex_tangents(
+        mesh.points,
+        mesh.weld[np.concatenate([mesh.faces, mesh.faces[seen]])],
+        np.concatenate([mesh.faces, mesh.back[seen]]),
+        mesh.uvs,
+        np.repeat([1, -1], [len(mesh.faces), len(seen)]),
+        mesh.normals,
+    )
     itself = np.arange(count)
     return ShadingMesh(
         positions=mesh.points[mesh.weld].astype(np.float32),
         normals=mesh.normals.astype(np.float32),
+        tangents=tangents,
         geometric=geometric,
         inset=inset,
         area=area,
@@ -249,6 +261,7 @@ def refined(
         grown,
         positions=kept(mesh.positions, grown.positions),
         normals=kept(mesh.normals, grown.normals),
+        tangents=kept(mesh.tangents, grown.tangents),
         geometric=kept(mesh.geometric, grown.geometric),
         inset=kept(mesh.inset, grown.inset),
         parents=np.concatenate([mesh.parents, ends.astype(np.uint32)]),

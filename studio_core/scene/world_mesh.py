@@ -20,6 +20,7 @@ from studio_core.scene.transform import Transform, rotation_matrix
 
 I32 = npt.NDArray[np.int32]
 NO_MATERIAL = -1
+_MOVED = ("positions", "normals", "tangents", "geometric", "inset", "area")
 
 
 class MeshCache:
@@ -80,17 +81,19 @@ class Placed:
 class WorldMesh:
     """All objects' shading meshes in the world, relative to `origin` (3,) float64; read-only arrays.
 
-    Per vertex, as in ShadingMesh: positions = world - origin (V, 3), normals, geometric, inset (V, 3), area
-    (V,) in m², uvs (V, 2) (zeros where a mesh has none), side (V,), object (V,) index into `objects`,
-    material (V,) the scene's number or -1. faces and back_faces (F, 3) into the vertices (NO_BACK: none);
-    face_material (F,) the front's. Object i has vertices vertex_offsets[i]:vertex_offsets[i + 1] and
-    likewise faces. World = float64 first, then minus origin, then float32: recentre far scenes by `origin`.
+    Per vertex, as in ShadingMesh: positions = world - origin (V, 3), normals, geometric, inset (V, 3),
+    tangents (V, 4), area (V,) in m², uvs (V, 2) (zeros where a mesh has none), side (V,), object (V,) index
+    into `objects`, material (V,) the scene's number or -1. faces and back_faces (F, 3) into the vertices
+    (NO_BACK: none); face_material (F,) the front's. Object i has vertices vertex_offsets[i]:vertex_offsets[i
+    + 1] and likewise faces. World = float64 first, then minus origin, then float32: recentre far scenes by
+    `origin`.
     """
 
     objects: tuple[Placed, ...]
     origin: npt.NDArray[np.float64]
     positions: F32
     normals: F32
+    tangents: F32
     geometric: F32
     inset: F32
     area: F32
@@ -135,13 +138,12 @@ class WorldMesh:
         moving = {i: t for i, t in transforms.items() if objects[i].transform != t}
         if not moving:
             return self
-        arrays = [a.copy() for a in (self.positions, self.normals, self.geometric, self.inset, self.area)]
+        arrays = [getattr(self, name).copy() for name in _MOVED]
         for index, transform in moving.items():
             objects[index] = dataclasses.replace(objects[index], transform=transform)
             for array, part in zip(arrays, _placed(objects[index], self.origin), strict=True):
                 array[self.vertices_of(index)] = part
-        names = ("positions", "normals", "geometric", "inset", "area")
-        fresh: dict[str, Any] = {n: readonly(a, np.float32) for n, a in zip(names, arrays, strict=True)}
+        fresh: dict[str, Any] = {n: readonly(a, np.float32) for n, a in zip(_MOVED, arrays, strict=True)}
         return dataclasses.replace(self, objects=tuple(objects), **fresh)
 
     def with_mesh(self, index: int, mesh: ShadingMesh) -> WorldMesh:
@@ -162,8 +164,7 @@ class WorldMesh:
                 parts.append(_placed(placed, self.origin))
             else:
                 own = self.vertices_of(index)
-                arrays = (self.positions, self.normals, self.geometric, self.inset)
-                parts.append((*(array[own] for array in arrays), self.area[own]))
+                parts.append(tuple(getattr(self, name)[own] for name in _MOVED))
         return _joined(objects, self.origin, parts)
 
 
@@ -215,9 +216,10 @@ def _joined(
         origin=origin,
         positions=floats(0, 3),
         normals=floats(1, 3),
-        geometric=floats(2, 3),
-        inset=floats(3, 3),
-        area=floats(4),
+        tangents=floats(2, 4),
+        geometric=floats(3, 3),
+        inset=floats(4, 3),
+        area=floats(5),
         uvs=readonly(joined(uvs, 2), np.float32),
         side=readonly(joined([mesh.side for mesh in meshes]), np.int8),
         object=readonly(np.repeat(np.arange(len(meshes)), np.diff(vertex)), np.int32),
@@ -231,7 +233,7 @@ def _joined(
 
 
 def _placed(placed: Placed, origin: npt.NDArray[np.float64]) -> tuple[F32, ...]:
-    """Positions, normals, geometric, inset and area of one object in the world."""
+    """What moves with one object, as in `_MOVED`, in the world."""
     mesh, transform = placed.mesh, placed.transform
     turn = rotation_matrix(transform.rotation).T
     shift = np.array(transform.translation) - origin
@@ -244,6 +246,7 @@ def _placed(placed: Placed, origin: npt.NDArray[np.float64]) -> tuple[F32, ...]:
     return (
         positions.astype(np.float32),
         turned(mesh.normals),
+        np.concatenate([turned(mesh.tangents[:, :3]), mesh.tangents[:, 3:]], axis=1),
         turned(mesh.geometric),
         turned(mesh.inset, scale),
         np.asarray(mesh.area * scale**2, np.float32),

@@ -38,13 +38,14 @@ F32 = npt.NDArray[np.float32]
 class ChosenPoints:
     """Points that light is summed at: what a `WorldMesh` says of its vertices, for points of our own.
 
-    Positions (P, 3) are relative to `origin`; normals and geometric (P, 3) unit; inset (P, 3) moves the
-    start of rays; material (P,) is a row of `Shapes`.
+    Positions (P, 3) are relative to `origin`; normals and geometric (P, 3) unit; tangents (P, 4);
+    inset (P, 3) moves the start of rays; material (P,) is a row of `Shapes`.
     """
 
     origin: npt.NDArray[np.float64]
     positions: F32
     normals: F32
+    tangents: F32
     geometric: F32
     inset: F32
     material: npt.NDArray[np.int32]

@@ -16,6 +16,7 @@ from studio_core.contract import Services
 from studio_core.raster import Coefficients, CoefficientTable, Compositor
 from studio_core.scene.nodes import Light, NodeId
 from studio_core.scene.shading_mesh import NO_BACK
+from studio_core.scene.tangents import arbitrary_tangents, perpendicular
 from studio_core.shading.artifacts import (
     Casters,
     ChosenPoints,
@@ -135,6 +136,7 @@ class ErrorMeter:
             mesh.origin,
             mesh.positions[some],
             mesh.normals[some],
+            mesh.tangents[some],
             mesh.geometric[some],
             mesh.inset[some],
             mesh.material[some],
@@ -184,11 +186,12 @@ def surface_points(surfaces: Surfaces, hits: Hits, frame: Frame) -> ChosenPoints
     corners = np.where(turned[:, None], back, corners)
     face_normal = np.where(turned[:, None], -face_normal, face_normal)
     weights = np.stack([1 - hits.u - hits.v, hits.u, hits.v], axis=1).astype(np.float64)
-    normals = np.einsum("nk,nkc->nc", weights, mesh.normals[corners].astype(np.float64))
+    normals = _unit(np.einsum("nk,nkc->nc", weights, mesh.normals[corners].astype(np.float64)))
     return ChosenPoints(
         mesh.origin,
         np.einsum("nk,nkc->nc", weights, place).astype(np.float32),
-        _unit(normals),
+        normals,
+        _tangents(weights, mesh.tangents[corners], normals),
         _unit(face_normal),
         np.zeros((len(corners), 3), np.float32),
         mesh.material[corners[:, 0]],
@@ -198,6 +201,16 @@ def surface_points(surfaces: Surfaces, hits: Hits, frame: Frame) -> ChosenPoints
 def _unit(vectors: F64) -> F32:
     length = np.linalg.norm(vectors, axis=1, keepdims=True)
     made: F32 = (vectors / np.maximum(length, 1e-30)).astype(np.float32)
+    return made
+
+
+def _tangents(weights: F64, tangents: F32, normals: F32) -> F32:
+    """(P, 4) tangents (P, 3, 4) of corners, weighted (P, 3), to unit normals (P, 3)."""
+    along = np.einsum("nk,nkc->nc", weights, tangents[:, :, :3].astype(np.float64))
+    flat = perpendicular(along, normals.astype(np.float64))
+    made = np.concatenate([flat.astype(np.float32), tangents[:, 0, 3:]], axis=1)
+    lost = ~flat.any(axis=1)
+    made[lost] = arbitrary_tangents(normals[lost])
     return made
 
 

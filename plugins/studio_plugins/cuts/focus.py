@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from studio_core.jit import call_address, kernel
-from studio_core.kernels.radiance import frame, local_view
+from studio_core.kernels.radiance import local_view, surface_frame
 from studio_plugins.cuts.choose import BLOCK, MOST_NODES, NODE, SUMS, write_node
 from studio_plugins.cuts.intervals import Pool
 
@@ -180,6 +180,7 @@ def focus_nodes(
     wanted: Bools,
     positions: F32,
     normals: F32,
+    tangents: F32,
     material: I32,
     eye: F32,
     address: I64,
@@ -222,7 +223,7 @@ def focus_nodes(
         if alpha[m] <= 0 or count == 0:
             continue
         nx, ny, nz = normals[p, 0], normals[p, 1], normals[p, 2]
-        frame(nx, ny, nz, axes)
+        surface_frame(normals[p], tangents[p], axes)
         local_view(positions[p], eye, axes, wo)
         shape = shapes[offset[m] :]
         base = 6 * first[number]

@@ -162,6 +162,7 @@ class FocusStage:
                     stale,
                     mesh.positions,
                     mesh.normals,
+                    mesh.tangents,
                     mesh.material,
                     eye,
                     shapes.address,

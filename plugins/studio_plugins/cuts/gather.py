@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from studio_core.colour import LUMINANCE
 from studio_core.jit import kernel
-from studio_core.kernels.radiance import frame
+from studio_core.kernels.radiance import surface_frame
 from studio_plugins.cuts.choose import (
     BLOCK,
     MOST_NODES,
@@ -42,6 +42,7 @@ def gather_light(
     stop: int,
     points: I64,
     normals: F32,
+    tangents: F32,
     object_of: I32,
     glossy: Bools,
     pool: Pool,
@@ -116,7 +117,7 @@ def gather_light(
         light = _RED * red + _GREEN * green + _BLUE * blue
         found = 0
         if light > 0.0 and glossy[p]:
-            frame(nx, ny, nz, axes)
+            surface_frame(normals[p], tangents[p], axes)
             index_runs(runs, count, index)
             allowed = np.float32(tolerance * max(light, floor))
             found = choose_nodes(
@@ -172,6 +173,7 @@ def gather_difference(
     stop: int,
     points: I64,
     normals: F32,
+    tangents: F32,
     glossy: Bools,
     coarse_pool: Pool,
     coarse_start: I64,
@@ -215,7 +217,7 @@ def gather_difference(
                 new[w] &= ~both
             light = _RED * known[p, 0] + _GREEN * known[p, 1] + _BLUE * known[p, 2]
             allowed = np.float32(tolerance * max(light, floor))
-            frame(nx, ny, nz, axes)
+            surface_frame(normals[p], tangents[p], axes)
             for sign in (_ONE, -_ONE):
                 words = old if sign > 0 else new
                 count = _runs_within(words, reach[0], reach[1], runs)

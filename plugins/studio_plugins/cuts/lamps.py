@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from studio_core.jit import kernel
-from studio_core.kernels.radiance import frame
+from studio_core.kernels.radiance import surface_frame
 from studio_core.kernels.raycast import RayCaster
 from studio_core.kernels.visibility import occlusion_rays
 from studio_core.parallel import Workers
@@ -64,6 +64,7 @@ class Source:
 def lamp_nodes(
     points: I64,
     normals: F32,
+    tangents: F32,
     glossy: Bools,
     towards: F32,
     weight: F32,
@@ -79,7 +80,7 @@ def lamp_nodes(
     place = 0
     for row in range(len(points)):
         p = points[row]
-        frame(normals[p, 0], normals[p, 1], normals[p, 2], axes)
+        surface_frame(normals[p], tangents[p], axes)
         total = np.zeros(3)
         count = 0
         for q in range(samples):
@@ -187,6 +188,7 @@ class LampCache:
             length = lamp_nodes(
                 block,
                 mesh.normals,
+                mesh.tangents,
                 glossy,
                 towards,
                 weight,

@@ -52,7 +52,7 @@ class NodeBlock:
 
     points (P,) rows of the mesh, -1 for none; first (P + 1,) number of each point's first node; data (6 N,):
     of a point with n nodes, from 6·first: x[n], y[n], z[n] (unit, in the shading frame of
-    `kernels.radiance.frame`), red[n], green[n], blue[n] (L·V·cosθ·Δω of the node).
+    `kernels.radiance.surface_frame`), red[n], green[n], blue[n] (L·V·cosθ·Δω of the node).
     """
 
     points: I64
@@ -190,6 +190,7 @@ class NodeTable:
                     block.most,
                     mesh.positions,
                     mesh.normals,
+                    mesh.tangents,
                     mesh.material,
                     eye,
                     shapes.address,

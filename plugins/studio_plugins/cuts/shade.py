@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from studio_core.jit import call_address, kernel
-from studio_core.kernels.radiance import frame, local_view
+from studio_core.kernels.radiance import local_view, surface_frame
 
 F32 = npt.NDArray[np.float32]
 I32 = npt.NDArray[np.int32]
@@ -25,6 +25,7 @@ def node_terms(
     most: int,
     positions: F32,
     normals: F32,
+    tangents: F32,
     material: I32,
     eye: F32,
     address: I64,
@@ -51,7 +52,7 @@ def node_terms(
             continue
         looked += count
         m = material[p]
-        frame(normals[p, 0], normals[p, 1], normals[p, 2], axes)
+        surface_frame(normals[p], tangents[p], axes)
         local_view(positions[p], eye, axes, wo)
         base = 6 * first[number]
         call_address(address[m], shapes[offset[m] :], wo, count, data[base:], values)

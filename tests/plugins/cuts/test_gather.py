@@ -13,6 +13,7 @@ from oracles import cuts as oracle
 from studio_core.kernels.directions import direction_set
 from studio_core.kernels.light_tree import LightTree
 from studio_core.kernels.radiance import frame
+from studio_core.scene.tangents import arbitrary_tangents
 from studio_plugins.cuts.choose import MOST_NODES, Prefix
 from studio_plugins.cuts.gather import gather_difference, gather_light
 from studio_plugins.cuts.glimpse import BEFORE, NOW
@@ -82,12 +83,13 @@ def gathered(points, leaves, tolerance=0.0, known=None, kind=np.uint16, room=MOS
             skip[number + 1, 0, list(point.stale)] = True
     numbers = np.arange(count, dtype=np.int64)
     normals = np.array([point.normal for point in points], np.float32)
+    tangents = arbitrary_tangents(normals)
     glossy = np.array([point.glossy for point in points], np.bool_)
     exact, coarse = pooled([point.exact for point in points]), pooled([glimpsed(point) for point in points])
     light_ = prefix.block, prefix.leaf, tolerance, 0.02 * prefix.power / 4
     owner = np.zeros(count, np.int32)
-    given_ = numbers, normals, owner, glossy, *exact, *coarse, row, skip, *light_
-    differing = numbers, normals, glossy, *coarse, *light_
+    given_ = numbers, normals, tangents, owner, glossy, *exact, *coarse, row, skip, *light_
+    differing = numbers, normals, tangents, glossy, *coarse, *light_
     irradiance, nodes = np.zeros((count, 3), np.float32), np.zeros(count, np.int64)
     runs_of = runs_of or [None] * count
     kept_runs = [[] if own is None else np.ravel(own).tolist() for own in runs_of]

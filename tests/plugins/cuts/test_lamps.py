@@ -138,7 +138,7 @@ def test_suns_are_samples_with_colours_of_their_own(kit, workers, shapes):
     eye = (EYE - mesh.origin).astype(np.float32)
     kernels = (shapes.address, shapes.terms, shapes.offset, shapes.data)
     lamp_terms(
-        0, len(mesh), kit.room.everything, mesh.positions, mesh.normals, mesh.material, eye,
+        0, len(mesh), kit.room.everything, mesh.positions, mesh.normals, mesh.tangents, mesh.material, eye,
         np.ascontiguousarray(towards), np.ones((1, 5), np.float32), power, seen, *kernels, terms, irradiance,
     )  # fmt: skip
     found = bench.layer()

@@ -11,6 +11,7 @@ from oracles.radiance import view_direction
 
 from studio_core.kernels.radiance import frame
 from studio_core.params import defaults
+from studio_core.scene.tangents import arbitrary_tangents
 from studio_core.shading.artifacts import TERMS, ChosenPoints, Shapes
 from studio_core.shading.job import Job
 from studio_plugins.cuts.nodes import NO_BLOCK, Detail, NodeBlock, NodeTable
@@ -57,7 +58,13 @@ def points_of(rng, count):
     places = rng.uniform(-1, 1, (count, 3)).astype(np.float32)
     normals = normals.astype(np.float32)
     return ChosenPoints(
-        np.zeros(3), places, normals, normals, zero, rng.integers(0, len(MODELS), count).astype(np.int32)
+        np.zeros(3),
+        places,
+        normals,
+        arbitrary_tangents(normals),
+        normals,
+        zero,
+        rng.integers(0, len(MODELS), count).astype(np.int32),
     )
 
 

@@ -14,6 +14,7 @@ from studio_core.kernels.directions import direction_set
 from studio_core.kernels.facing import shown_sides
 from studio_core.kernels.radiance import environment_terms, lamp_terms
 from studio_core.params import defaults
+from studio_core.scene.tangents import arbitrary_tangents
 from studio_core.scene.transform import looking, rotation_matrix
 from studio_core.session import View
 from studio_core.shading.artifacts import TERMS
@@ -68,7 +69,15 @@ def test_environment_sums(host, model, normal, tilt, level, place, at_the_eye):
         out, irradiance = np.zeros((1, TERMS, 3), np.float32), np.zeros((1, 3), np.float32)
         bits = np.full((1, DIRECTIONS.size // 64), np.uint64(0xFFFFFFFFFFFFFFFF))
         leaves = np.full((DIRECTIONS.size, 3), light, np.float32)
-        where = (np.zeros(1, np.int64), position, n[None], np.zeros(1, np.int32), eye, bits)
+        where = (
+            np.zeros(1, np.int64),
+            position,
+            n[None],
+            arbitrary_tangents(n[None]),
+            np.zeros(1, np.int32),
+            eye,
+            bits,
+        )
         sums = (DIRECTIONS.directions, leaves, DIRECTIONS.solid_angle, *tables(host, model))
         environment_terms(0, 1, *where, *sums, out, irradiance)
         made.append((out, irradiance))
@@ -86,7 +95,14 @@ def test_lamp_sums(host, model, normal, tilt, towards_tilt, power, place):
     eye = (position[0] + grazing(n, tilt)).astype(np.float32)
     towards = grazing(n, towards_tilt)[None, None]
     out, irradiance = np.zeros((1, TERMS, 3), np.float32), np.zeros((1, 3), np.float32)
-    where = (np.zeros(1, np.int64), position, n[None], np.zeros(1, np.int32), eye)
+    where = (
+        np.zeros(1, np.int64),
+        position,
+        n[None],
+        arbitrary_tangents(n[None]),
+        np.zeros(1, np.int32),
+        eye,
+    )
     light = (towards, np.full((1, 1), weight), np.ones((1, 3), np.float32), np.ones((1, 1), np.bool_))
     lamp_terms(0, 1, *where, *light, *tables(host, model), out, irradiance)
     assert np.isfinite(out).all()

@@ -9,6 +9,7 @@ from oracles.radiance import light_sum
 from studio_core.kernels.directions import direction_set
 from studio_core.kernels.radiance import environment_terms, lamp_terms
 from studio_core.params import defaults
+from studio_core.scene.tangents import arbitrary_tangents
 from studio_core.shading.artifacts import TERMS
 
 MODELS = ("lambert", "phong", "blinn-phong", "ggx")
@@ -45,7 +46,16 @@ def test_environment_sum_equals_the_oracle(host):
     eye = np.array([0.3, 4.0, 1.0], np.float32)
     out, irradiance = np.zeros((count, TERMS, 3), np.float32), np.zeros((count, 3), np.float32)
     points = np.arange(count, dtype=np.int64)
-    arguments = (positions, normals, material, eye, _words(visible), directions.directions, light)
+    arguments = (
+        positions,
+        normals,
+        arbitrary_tangents(normals),
+        material,
+        eye,
+        _words(visible),
+        directions.directions,
+        light,
+    )
     environment_terms(
         0, count, points, *arguments, directions.solid_angle, address, terms, offsets, data, out, irradiance
     )
@@ -82,6 +92,7 @@ def test_only_the_wanted_points_are_written(host):
         points,
         positions,
         normals,
+        arbitrary_tangents(normals),
         np.zeros(5, np.int32),
         np.zeros(3, np.float32),
         bits,
@@ -116,7 +127,17 @@ def test_lamp_sum_equals_the_oracle(host, samples, kind):
     eye = np.array([1.0, 2.0, 3.0], np.float32)
     out, irradiance = np.zeros((count, TERMS, 3), np.float32), np.zeros((count, 3), np.float32)
     points = np.arange(count, dtype=np.int64)
-    arguments = (positions, normals, material, eye, towards, weight, colour, seen)
+    arguments = (
+        positions,
+        normals,
+        arbitrary_tangents(normals),
+        material,
+        eye,
+        towards,
+        weight,
+        colour,
+        seen,
+    )
     for start, stop in ((0, 3), (3, count)):
         lamp_terms(start, stop, points, *arguments, address, terms, offsets, data, out, irradiance)
     for p in range(count):

@@ -114,7 +114,7 @@ class PaperPath:
     def nodes(self, points: I64, tree: LightTree, job: Checkpoints | None = None) -> list[NodeBlock]:
         """The nodes of equation (3) at rows `points` of the mesh: ω_k and l_k v_k, in blocks of 1,024."""
         numbers, values, sizes = self._cuts(points, tree, job)
-        normals, axis = self.placed.mesh.normals, self._directions.cones.axis
+        mesh, axis = self.placed.mesh, self._directions.cones.axis
         started = time.perf_counter()
         blocks = []
         for begin in range(0, len(points), BLOCK):
@@ -135,7 +135,8 @@ class PaperPath:
                     start,
                     stop,
                     chosen,
-                    normals,
+                    mesh.normals,
+                    mesh.tangents,
                     numbers[part],
                     values[part],
                     first,

@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from studio_core.jit import kernel
-from studio_core.kernels.radiance import LOWEST_VIEW, frame
+from studio_core.kernels.radiance import LOWEST_VIEW, surface_frame
 from studio_plugins.cuts.paper.placement import f32_at, u16_at
 
 I64 = npt.NDArray[np.int64]
@@ -49,6 +49,7 @@ def nodes_of(
     stop: int,
     points: I64,
     normals: F32,
+    tangents: F32,
     number_addresses: I64,
     value_addresses: I64,
     first: I64,
@@ -66,7 +67,7 @@ def nodes_of(
     lowest = np.float32(LOWEST_VIEW)
     for row in range(start, stop):
         p = points[row]
-        frame(normals[p, 0], normals[p, 1], normals[p, 2], axes)
+        surface_frame(normals[p], tangents[p], axes)
         numbers = u16_at(number_addresses[row])
         values = f32_at(value_addresses[row])
         n = first[row + 1] - first[row]
