@@ -16,7 +16,7 @@ from studio_core.kernels.radiance import lamp_terms
 from studio_core.kernels.visibility import occlusion_rays
 from studio_core.params import defaults
 from studio_core.scene.transform import Transform, axis_angle, rotation_matrix
-from studio_core.shading.artifacts import TERMS, Lamp, Shapes
+from studio_core.shading.artifacts import Lamp, Shapes
 from studio_core.shading.brute_force import lamp_layer
 from studio_core.shading.job import Job
 from studio_plugins.cuts.lamps import LampCache, Source, lamp_source, shadowed, sphere
@@ -133,7 +133,10 @@ def test_suns_are_samples_with_colours_of_their_own(kit, workers, shapes):
         inset=mesh.inset,
     )
     assert seen.any()
-    terms, irradiance = np.zeros((len(mesh), TERMS, 3), np.float32), np.zeros((len(mesh), 3), np.float32)
+    terms, irradiance = (
+        np.zeros((len(mesh), shapes.width, 3), np.float32),
+        np.zeros((len(mesh), 3), np.float32),
+    )
     towards = DirectionList(ways.astype(np.float32)).given[None]
     eye = (EYE - mesh.origin).astype(np.float32)
     kernels = (shapes.address, shapes.terms, shapes.offset, shapes.data)
