@@ -113,6 +113,22 @@ def balanced(front: Strip, back: Strip, stand: Stand, loss: float | None = None)
     return Balance(np.exp(found.x[:3]), falloff, doubt, _off(left(found.x), noise), rim)
 
 
+def ring_gain(front: Strip, back: Strip) -> F64 | None:
+    """(3,) front = gain · back from all that both lenses see, wherever it lies: geometric means of the ring.
+
+    However the phone was rolled, both show about the same ring; so this needs no rotation. None where
+    neither shows enough of it.
+    """
+    means = []
+    for strip in (front, back):
+        theta = strip.grid()[..., 1]
+        ring = strip.resolved & (np.abs(theta - math.pi / 2) < EDGE * strip.lens.half - math.pi / 2)
+        if ring.sum() < 100:
+            return None
+        means.append(strip.light[ring].mean(axis=0, dtype=np.float64))
+    return np.asarray(2.0 ** (means[0] - means[1]), np.float64)
+
+
 def _falloff(x: F64) -> tuple[float, float, float]:
     whole, u, v = (float(p) for p in x[3:6])
     return -whole * (1 - u - v), -whole * u, -whole * v

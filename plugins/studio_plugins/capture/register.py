@@ -13,7 +13,7 @@ from studio_core.capturing.settings import BACK, FRONT, LensSettings, Patch, Reg
 from studio_core.capturing.standing import rotation_from
 from studio_core.imaging.projection import OCAM, ORTHOGRAPHIC, Circle, Lens
 from studio_core.shading.job import Job
-from studio_plugins.capture.falloff import NO_RIM, Balance, balanced, from_loss
+from studio_plugins.capture.falloff import NO_RIM, Balance, balanced, from_loss, ring_gain
 from studio_plugins.capture.guesses import by_features, by_rolling, by_sliding
 from studio_plugins.capture.overlap import Stand, Strip, rotation_of, stand_of, unroll
 from studio_plugins.capture.refine import BLURS, refined
@@ -42,7 +42,9 @@ def register(
 
     Nothing is assumed of the roll of either shot. `lens.fit_fov`: the field of view is sought too (never for
     calibrated OCamCalib lenses). Where the overlap shows too little, `trusted` is False, a note says why, and
-    the result is what the settings say. A registration by hand (`settings.automatic` off) is trusted.
+    the result is what the settings say; how much brighter one lens' picture is follows from the whole ring
+    that both see then, unless the settings tell it. A registration by hand (`settings.automatic` off) is
+    trusted.
     """
     by_hand = stand_of(rotation_from(settings.yaw, settings.pitch, settings.roll), front.lens)
     fit_fov = lens.fit_fov and front.lens.model != OCAM
@@ -58,7 +60,9 @@ def register(
     fit = _fitted(*strips, by_hand, fit_fov, job)
     why = _doubtful(fit)
     if fit is None or why:
-        return _as_set(by_hand, front, settings, lens, None, why)
+        refused = _as_set(by_hand, front, settings, lens, None, why)
+        gain = None if settings.exposure else ring_gain(*strips)
+        return refused if gain is None else replace(refused, gain=gain)
     found = balanced(*strips, fit.stand, lens.falloff)
     job.checkpoint(_STEPS, _STEPS)
     return _registration(fit, found, front, back, settings, lens)

@@ -215,6 +215,17 @@ def test_without_anything_to_see_it_is_refused(plain: Truth) -> None:
     assert found.gain == pytest.approx(0.5)
 
 
+def test_what_cannot_be_registered_is_still_as_bright(plain: Truth) -> None:
+    front, back = views(plain)
+    rng = np.random.default_rng(2)
+    factors = np.array([0.5, 0.4, 0.7], np.float32)
+    light = [np.exp(rng.normal(0, 0.02, front.light.shape)).astype(np.float32) for _ in range(2)]
+    front, back = replace(front, light=light[0]), replace(back, light=light[1] * factors)
+    found = register(front, back, RegistrationSettings(), LensSettings(), Job("test"))
+    assert not found.trusted
+    assert found.gain == pytest.approx(1 / factors, rel=0.01)
+
+
 def test_two_rooms_are_not_one(plain: Truth) -> None:
     other = lens_light(room(99), PHONE, 1)
     found = registered(replace(plain, back=other.back))
