@@ -1,7 +1,7 @@
 """How much light a material returns, by the angle it is seen from: directional and mean albedo.
 
 E(ω_o) = ∫ f_r cos θ_i dω_i. Integrals are of the scalar terms, which depend on the shape alone; so a change
-of colour costs nothing. Models that draw directions are summed over a lattice of their own samples until two
+of colour costs nothing. Models that draw directions are summed over a lattice of their own samples until four
 lattices agree; the others, and whatever does not settle, by adaptive quadrature.
 """
 
@@ -24,11 +24,11 @@ from studio_core.params import Value
 F32 = npt.NDArray[np.float32]
 F64 = npt.NDArray[np.float64]
 
-TOLERANCE = 1e-3  # of a term's albedo there, or of a twentieth of its largest
-LEAST = 0.05
+TOLERANCE = 1e-3  # of a term's albedo there, or of a tenth of its largest
+LEAST = 0.1
 STEEPEST = np.radians(89.9)
-LATTICES = ((610, 377), (2584, 1597), (10946, 6765))  # Fibonacci numbers
-SHIFTS = ((0.5, 0.25), (0.0, 0.75))
+LATTICES = ((377, 233), (1597, 987), (6765, 4181), (28657, 17711))  # Fibonacci numbers
+SHIFTS = ((0.125, 0.25), (0.375, 0.0), (0.625, 0.75), (0.875, 0.5))
 BOX = 0.1  # a box's part of the tolerance
 KEPT = 256
 _DOWN = np.array([0, 0, -1], np.float32)
@@ -120,11 +120,10 @@ def _term_albedo(brdf: Brdf, shape: F32, theta: F64, azimuth: float, tolerance: 
     left = np.arange(len(wo))
     if is_sampled(brdf):
         for points in (_lattice(*lattice) for lattice in LATTICES):
-            halves = np.array([_by_samples(cast(SampledBrdf, brdf), shape, wo[row], points) for row in left])
-            made[left] = halves.mean(axis=1)
-            off = np.abs(halves[:, 0] - halves[:, 1]) / 2
+            each = np.array([_by_samples(cast(SampledBrdf, brdf), shape, wo[row], points) for row in left])
+            made[left] = each.mean(axis=1)
             scale = np.maximum(made[left], LEAST * made.max(axis=0))
-            left = left[(off > tolerance / 2 * scale).any(axis=1)]
+            left = left[(np.ptp(each, axis=1) > 2 * tolerance * scale).any(axis=1)]
             if not len(left):
                 return made
     else:
@@ -136,28 +135,28 @@ def _term_albedo(brdf: Brdf, shape: F32, theta: F64, azimuth: float, tolerance: 
 
 
 def _lattice(count: int, step: int) -> F32:
-    """(2 · count, 2): a lattice twice, shifted; folded along u0, where maps are not periodic."""
+    """(4 · count, 2): a lattice under each shift; folded along u0, where maps are not periodic."""
     i = np.arange(count)
-    both = []
+    every = []
     for a, b in SHIFTS:
         u0, u1 = (i + a) / count % 1.0, (i * step / count + b) % 1.0
-        both.append(np.stack([1 - np.abs(2 * u0 - 1), u1], 1))
-    return np.minimum(np.concatenate(both).astype(np.float32), _BELOW_ONE)
+        every.append(np.stack([1 - np.abs(2 * u0 - 1), u1], 1))
+    return np.minimum(np.concatenate(every).astype(np.float32), _BELOW_ONE)
 
 
 def _by_samples(brdf: SampledBrdf, shape: F32, wo: F32, u: F32) -> F64:
-    """(2, terms) from each half of the points."""
-    made = np.zeros((2, brdf.terms))
+    """(shifts, terms) from each lattice."""
+    made = np.zeros((len(SHIFTS), brdf.terms))
     left = list(range(brdf.terms))
     while left:
         wi = sample(brdf, shape, wo, left[0], u)
         wi = np.where(wi[:, 2:] > 0, wi, _DOWN)
-        drawn = density(brdf, shape, wo, wi).astype(np.float64)
-        values = evaluate(brdf, shape, wo, wi) * wi[:, 2:]
+        drawn = density(brdf, shape, wo, wi)
         own = drawn[:, left[0]]
         alike = [k for k in left if np.array_equal(drawn[:, k], own)]  # most terms share a lobe
-        weight = np.divide(1.0, own, out=np.zeros_like(own), where=own > 0)[:, None]
-        made[:, alike] = (values[:, alike] * weight).reshape(2, -1, len(alike)).mean(axis=1)
+        weight = np.divide(wi[:, 2], own, out=np.zeros_like(own), where=own > 0)[:, None]
+        values = evaluate(brdf, shape, wo, wi)[:, alike] * weight
+        made[:, alike] = values.reshape(len(SHIFTS), -1, len(alike)).mean(axis=1, dtype=np.float64)
         left = [k for k in left if k not in alike]
     return made
 

@@ -19,6 +19,14 @@ carray = cast(Any, numba).carray  # an array at a C pointer
 SIGNATURE = "void(CPointer(float32), CPointer(float32), int64, CPointer(float32), CPointer(float32))"
 """Of the C function that `studio_core.contract.Brdf.address` names."""
 
+SAMPLE_SIGNATURE = (
+    "void(CPointer(float32), CPointer(float32), int64, int64, CPointer(float32), CPointer(float32))"
+)
+"""Of the C function that `studio_core.contract.SampledBrdf.sampler` names."""
+
+DENSITY_SIGNATURE = SIGNATURE
+"""Of the C function that `studio_core.contract.SampledBrdf.density` names."""
+
 ZERO = np.float32(0.0)
 HALF = np.float32(0.5)
 ONE = np.float32(1.0)

@@ -35,15 +35,24 @@ import numpy.typing as npt
 
 from studio_core.jit import batch_function
 from studio_core.kernels.brdf import (
+    DENSITY_SIGNATURE,
     HALF,
     LEAST_HEIGHT,
     ONE,
+    SAMPLE_SIGNATURE,
     SIGNATURE,
     ZERO,
     carray,
     ggx_distribution,
     schlick_weight,
     smith_factor,
+)
+from studio_core.kernels.sampling import (
+    cosine_density,
+    cosine_direction,
+    reflected,
+    visible_normal,
+    visible_reflection_density,
 )
 from studio_core.params import Colour, Value, param
 
@@ -90,6 +99,47 @@ def evaluate(shape: Any, wo: Any, count: int, wi: Any, out: Any) -> None:
         b2[k] = lobe * fresnel
 
 
+@batch_function(SAMPLE_SIGNATURE)
+def sample(shape: Any, wo: Any, term: int, count: int, u: Any, wi: Any) -> None:
+    """By the cosine, and by visible normals; see `studio_core.contract.SampledBrdf`."""
+    alpha = carray(shape, 1)[0]
+    o = carray(wo, 3)
+    ox, oy, oz = o[0], o[1], o[2]
+    numbers = carray(u, 2 * count)
+    u0, u1 = numbers[:count], numbers[count:]
+    directions = carray(wi, 3 * count)
+    x, y, z = directions[:count], directions[count : 2 * count], directions[2 * count :]
+    seen = oz > ZERO
+    up = max(oz, LEAST_HEIGHT)
+    for k in range(count):
+        if term == 0:
+            a, b, c = cosine_direction(u0[k], u1[k])
+        else:
+            hx, hy, hz = visible_normal(ox, oy, up, alpha, alpha, u0[k], u1[k])
+            a, b, c = reflected(ox, oy, oz, hx, hy, hz)
+        x[k], y[k], z[k] = a, b, (c if seen else -ONE)
+
+
+@batch_function(DENSITY_SIGNATURE)
+def density(shape: Any, wo: Any, count: int, wi: Any, out: Any) -> None:
+    """cos θ / π, and G1 D / (4 n·ω_o) twice; see `studio_core.contract.SampledBrdf`."""
+    alpha = carray(shape, 1)[0]
+    o = carray(wo, 3)
+    ox, oy, oz = o[0], o[1], o[2]
+    directions = carray(wi, 3 * count)
+    x, y, z = directions[:count], directions[count : 2 * count], directions[2 * count :]
+    terms = carray(out, 3 * count)
+    d0, d1, d2 = terms[:count], terms[count : 2 * count], terms[2 * count :]
+    seen = oz > ZERO
+    up = max(oz, ZERO)
+    for k in range(count):
+        lit = ONE if (seen and z[k] > ZERO) else ZERO
+        lobe = lit * visible_reflection_density(ox, oy, up, x[k], y[k], z[k], alpha)
+        d0[k] = lit * cosine_density(z[k])
+        d1[k] = lobe
+        d2[k] = lobe
+
+
 class Ggx:
     """See the module; satisfies `studio_core.contract.Brdf`."""
 
@@ -103,6 +153,16 @@ class Ggx:
     def address(self) -> int:
         """Address of `evaluate`."""
         return evaluate.address
+
+    @property
+    def sampler(self) -> int:
+        """Address of `sample`."""
+        return sample.address
+
+    @property
+    def density(self) -> int:
+        """Address of `density`."""
+        return density.address
 
     def shape(self, values: Mapping[str, Value]) -> npt.NDArray[np.float32]:
         """(1,): α."""

@@ -19,7 +19,8 @@ import numpy as np
 import numpy.typing as npt
 
 from studio_core.jit import batch_function
-from studio_core.kernels.brdf import ONE, SIGNATURE, ZERO, carray
+from studio_core.kernels.brdf import DENSITY_SIGNATURE, ONE, SAMPLE_SIGNATURE, SIGNATURE, ZERO, carray
+from studio_core.kernels.sampling import cosine_density, cosine_direction
 from studio_core.params import Colour, Value, param
 
 
@@ -42,6 +43,29 @@ def evaluate(shape: Any, wo: Any, count: int, wi: Any, out: Any) -> None:
         b[k] = ONE if (up and z[k] > ZERO) else ZERO
 
 
+@batch_function(SAMPLE_SIGNATURE)
+def sample(shape: Any, wo: Any, term: int, count: int, u: Any, wi: Any) -> None:
+    """By the cosine; see `studio_core.contract.SampledBrdf`."""
+    seen = carray(wo, 3)[2] > ZERO
+    numbers = carray(u, 2 * count)
+    u0, u1 = numbers[:count], numbers[count:]
+    directions = carray(wi, 3 * count)
+    x, y, z = directions[:count], directions[count : 2 * count], directions[2 * count :]
+    for k in range(count):
+        x[k], y[k], up = cosine_direction(u0[k], u1[k])
+        z[k] = up if seen else -up
+
+
+@batch_function(DENSITY_SIGNATURE)
+def density(shape: Any, wo: Any, count: int, wi: Any, out: Any) -> None:
+    """cos θ / π; see `studio_core.contract.SampledBrdf`."""
+    lit = ONE if carray(wo, 3)[2] > ZERO else ZERO
+    z = carray(wi, 3 * count)[2 * count :]
+    d = carray(out, count)
+    for k in range(count):
+        d[k] = lit * cosine_density(z[k])
+
+
 class Lambert:
     """See the module; satisfies `studio_core.contract.Brdf`."""
 
@@ -55,6 +79,16 @@ class Lambert:
     def address(self) -> int:
         """Address of `evaluate`."""
         return evaluate.address
+
+    @property
+    def sampler(self) -> int:
+        """Address of `sample`."""
+        return sample.address
+
+    @property
+    def density(self) -> int:
+        """Address of `density`."""
+        return density.address
 
     def shape(self, values: Mapping[str, Value]) -> npt.NDArray[np.float32]:
         """Matte surfaces have no shape: (0,)."""

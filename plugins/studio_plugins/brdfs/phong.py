@@ -27,7 +27,23 @@ import numpy as np
 import numpy.typing as npt
 
 from studio_core.jit import batch_function
-from studio_core.kernels.brdf import HALF, ONE, SIGNATURE, ZERO, carray, power_of_complement
+from studio_core.kernels.brdf import (
+    DENSITY_SIGNATURE,
+    HALF,
+    ONE,
+    SAMPLE_SIGNATURE,
+    SIGNATURE,
+    ZERO,
+    carray,
+    power_of_complement,
+)
+from studio_core.kernels.sampling import (
+    TURN,
+    around_mirror,
+    cosine_density,
+    cosine_direction,
+    power_height,
+)
 from studio_core.params import Value
 from studio_plugins.brdfs.two_lobes import TwoLobeParams, TwoLobes, exponent, sharpness
 
@@ -58,6 +74,44 @@ def evaluate(shape: Any, wo: Any, count: int, wi: Any, out: Any) -> None:
         b1[k] = lit * peak * power_of_complement(t, ONE - t, n)
 
 
+@batch_function(SAMPLE_SIGNATURE)
+def sample(shape: Any, wo: Any, term: int, count: int, u: Any, wi: Any) -> None:
+    """By the cosine, and by cos^n a around the mirror; see `studio_core.contract.SampledBrdf`."""
+    n = carray(shape, 2)[0]
+    o = carray(wo, 3)
+    ox, oy, oz = o[0], o[1], o[2]
+    numbers = carray(u, 2 * count)
+    u0, u1 = numbers[:count], numbers[count:]
+    directions = carray(wi, 3 * count)
+    x, y, z = directions[:count], directions[count : 2 * count], directions[2 * count :]
+    seen = oz > ZERO
+    for k in range(count):
+        if term == 0:
+            a, b, c = cosine_direction(u0[k], u1[k])
+        else:
+            a, b, c = around_mirror(ox, oy, oz, power_height(u0[k], n), u1[k])
+        x[k], y[k], z[k] = a, b, (c if seen else -ONE)
+
+
+@batch_function(DENSITY_SIGNATURE)
+def density(shape: Any, wo: Any, count: int, wi: Any, out: Any) -> None:
+    """cos θ / π and (n + 1) / 2π · cos^n a; see `studio_core.contract.SampledBrdf`."""
+    n = carray(shape, 2)[0]
+    peak = (n + ONE) / TURN
+    o = carray(wo, 3)
+    ox, oy, oz = o[0], o[1], o[2]
+    directions = carray(wi, 3 * count)
+    x, y, z = directions[:count], directions[count : 2 * count], directions[2 * count :]
+    terms = carray(out, 2 * count)
+    d0, d1 = terms[:count], terms[count:]
+    for k in range(count):
+        dx, dy, dz = x[k] + ox, y[k] + oy, z[k] - oz
+        lit = ONE if (oz > ZERO and z[k] > ZERO) else ZERO
+        t = HALF * (dx * dx + dy * dy + dz * dz)  # 1 − cos a
+        d0[k] = lit * cosine_density(z[k])
+        d1[k] = lit * peak * power_of_complement(t, ONE - t, n)
+
+
 class Phong(TwoLobes):
     """See the module; satisfies `studio_core.contract.Brdf`."""
 
@@ -69,6 +123,16 @@ class Phong(TwoLobes):
     def address(self) -> int:
         """Address of `evaluate`."""
         return evaluate.address
+
+    @property
+    def sampler(self) -> int:
+        """Address of `sample`."""
+        return sample.address
+
+    @property
+    def density(self) -> int:
+        """Address of `density`."""
+        return density.address
 
     def shape(self, values: Mapping[str, Value]) -> npt.NDArray[np.float32]:
         """(2,): exponent and the lobe's peak."""
