@@ -70,7 +70,7 @@ def term_albedo(
     """(A, terms) ∫ b_k cos θ dω, kept while shape and angles stay."""
     theta = np.minimum(np.atleast_1d(np.asarray(angles, np.float64)), STEEPEST)
     digest = hashlib.blake2b(np.ascontiguousarray(shape, np.float32).data, digest_size=16).digest()
-    key = (brdf, digest, theta.tobytes(), float(azimuth), tolerance)
+    key = (brdf.address, brdf.terms, digest, theta.tobytes(), float(azimuth), tolerance)
     found = _KNOWN.get(key)
     if found is None:
         found = _term_albedo(brdf, shape, theta, azimuth, tolerance)

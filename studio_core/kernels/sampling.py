@@ -42,6 +42,12 @@ def cosine_density(z: F) -> F:
 
 
 @kernel
+def even_direction(u0: F, u1: F) -> Vector:
+    """A direction of the hemisphere, all alike: density 1 / 2π."""
+    return around_normal(u0, u1)
+
+
+@kernel
 def power_height(u0: F, n: F) -> F:
     """1 − cos θ of a direction with density (n + 1) / 2π · cos^n θ: 1 − (1 − u0)^(1 / (n + 1))."""
     made: F = -np.expm1(np.log1p(-u0) / (n + ONE))

@@ -29,7 +29,19 @@ from studio_core.brdfs.calls import evaluate as call
 from studio_core.contract import Brdf
 from studio_core.errors import InputError
 from studio_core.jit import batch_function
-from studio_core.kernels.brdf import HALF, ONE, SIGNATURE, ZERO, carray
+from studio_core.kernels.brdf import (
+    DENSITY_SIGNATURE,
+    HALF,
+    LEAST_HEIGHT,
+    ONE,
+    SAMPLE_SIGNATURE,
+    SIGNATURE,
+    TWO,
+    ZERO,
+    carray,
+)
+from studio_core.kernels.half_angles import EDGES, cumulative, drawn_height, height_density
+from studio_core.kernels.sampling import around_normal, cosine_density, cosine_direction, reflected
 from studio_core.kernels.tables import REFERENCE, reference, referred
 from studio_core.params import Colour, Value, param
 from studio_core.scene.geometry import Table
@@ -62,7 +74,7 @@ class Params:
 
 @batch_function(SIGNATURE)
 def evaluate(shape: Any, wo: Any, count: int, wi: Any, out: Any) -> None:
-    """See `studio_core.contract.Brdf`. shape: reference of the table, then s at CURVE directions."""
+    """See `studio_core.contract.Brdf`. shape: reference of the table, s at CURVE directions, half angles."""
     s = carray(shape, REFERENCE + CURVE)
     table = referred(s)
     half, difference, azimuth = int(s[4]), int(s[5]), int(s[6])
@@ -124,6 +136,45 @@ def evaluate(shape: Any, wo: Any, count: int, wi: Any, out: Any) -> None:
         terms[2 * count + k] = scale * blue
 
 
+@batch_function(SAMPLE_SIGNATURE)
+def sample(shape: Any, wo: Any, term: int, count: int, u: Any, wi: Any) -> None:
+    """By the cosine and by half angles, half each; see `studio_core.contract.SampledBrdf`."""
+    angles = carray(shape, REFERENCE + CURVE + EDGES)[REFERENCE + CURVE :]
+    o = carray(wo, 3)
+    ox, oy, oz = o[0], o[1], o[2]
+    numbers = carray(u, 2 * count)
+    u0, u1 = numbers[:count], numbers[count:]
+    directions = carray(wi, 3 * count)
+    x, y, z = directions[:count], directions[count : 2 * count], directions[2 * count :]
+    for k in range(count):
+        if u0[k] < HALF:
+            a, b, c = cosine_direction(TWO * u0[k], u1[k])
+        else:
+            hx, hy, hz = around_normal(drawn_height(angles, TWO * u0[k] - ONE), u1[k])
+            facing = ox * hx + oy * hy + oz * hz > ZERO
+            a, b, c = reflected(ox, oy, oz, hx, hy, hz)
+            c = c if facing else -ONE
+        x[k], y[k], z[k] = a, b, (c if oz > ZERO else -ONE)
+
+
+@batch_function(DENSITY_SIGNATURE)
+def density(shape: Any, wo: Any, count: int, wi: Any, out: Any) -> None:
+    """cos θ / 2π + D(h) / (8 ω_o·h), the same for every term; see `studio_core.contract.SampledBrdf`."""
+    angles = carray(shape, REFERENCE + CURVE + EDGES)[REFERENCE + CURVE :]
+    o = carray(wo, 3)
+    ox, oy, oz = o[0], o[1], o[2]
+    directions = carray(wi, 3 * count)
+    x, y, z = directions[:count], directions[count : 2 * count], directions[2 * count :]
+    terms = carray(out, 3 * count)
+    for k in range(count):
+        lit = ONE if (oz > ZERO and z[k] > ZERO) else ZERO
+        hx, hy, hz = x[k] + ox, y[k] + oy, max(z[k] + oz, LEAST_HEIGHT)
+        flat = np.sqrt(hx * hx + hy * hy)
+        lobe = height_density(angles, flat, hz) / (TWO * np.sqrt(flat * flat + hz * hz))
+        both = lit * HALF * (cosine_density(z[k]) + lobe)
+        terms[k] = terms[count + k] = terms[2 * count + k] = both
+
+
 class Measured:
     """See the module; satisfies `studio_core.contract.TabulatedBrdf`."""
 
@@ -137,18 +188,29 @@ class Measured:
     def __init__(self) -> None:
         self._plain = Table(np.full((2, 2, 2, 3), 0.5 / np.pi, np.float32), "grey")
         self._albedos: dict[str, F64] = {}
+        self._angles: dict[str, F32] = {}
 
     @property
     def address(self) -> int:
         """Address of `evaluate`."""
         return evaluate.address
 
+    @property
+    def sampler(self) -> int:
+        """Address of `sample`."""
+        return sample.address
+
+    @property
+    def density(self) -> int:
+        """Address of `density`."""
+        return density.address
+
     def shape(self, values: Mapping[str, Value]) -> F32:
-        """(80,) of the stand-in."""
+        """(145,) of the stand-in."""
         return self.shape_of(values, {SLOT: self._plain})
 
     def shape_of(self, values: Mapping[str, Value], tables: Mapping[str, Table]) -> F32:
-        """(80,): reference of the table, and s at CURVE directions."""
+        """(145,): reference of the table, s at CURVE directions, how half angles are drawn."""
         table = tables[SLOT]
         if table.values.shape[3] != 3 or table.values.min() < 0:
             raise InputError("its measurement is no table of reflectances in red, green and blue")
@@ -156,12 +218,22 @@ class Measured:
         if values["keep_energy"]:
             most = self.albedo(table).max(axis=1)
             curve = np.where(most > _MARGIN, _MARGIN / np.maximum(most, _MARGIN), 1.0)
-        return np.concatenate([reference(table), curve.astype(np.float32)])
+        return np.concatenate([reference(table), curve.astype(np.float32), self._half_angles(table)])
 
     def coefficients(self, values: Mapping[str, npt.NDArray[np.floating[Any]]]) -> F32:
         """(..., 3, 3): the tint on the diagonal."""
         tint: F32 = np.clip(np.asarray(values["tint"], np.float32), 0, 1)
         return tint[..., None, :] * np.eye(3, dtype=np.float32)
+
+    def _half_angles(self, table: Table) -> F32:
+        """(EDGES,) how often half vectors are drawn, by the table's mean over difference angles."""
+        if table.key not in self._angles:
+            while len(self._angles) >= _MOST_KEPT:
+                self._angles.pop(next(iter(self._angles)))
+            difference = (np.arange(table.values.shape[1]) + 0.5) / table.values.shape[1]
+            weight = np.sin(np.pi * difference)  # sin 2θ_d: grazing ones lie close together
+            self._angles[table.key] = cumulative(table.values.sum(axis=(2, 3), dtype=np.float64) @ weight)
+        return self._angles[table.key]
 
     def albedo(self, table: Table) -> F64:
         """(CURVE, 3) share of light that comes back, at directions even in θ from above to grazing.
@@ -175,7 +247,7 @@ class Measured:
         return self._albedos[table.key]
 
     def _measured_albedo(self, table: Table) -> F64:
-        shape = np.concatenate([reference(table), np.ones(CURVE, np.float32)])
+        shape = np.concatenate([reference(table), np.ones(CURVE + EDGES, np.float32)])
         rows, turns = 2 * max(table.values.shape[0], 45), 48
         edge = np.linspace(0, 1, rows + 1)
         theta = np.pi / 2 * (edge[1:] / 2 + edge[:-1] / 2) ** 2

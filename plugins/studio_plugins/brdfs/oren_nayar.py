@@ -30,7 +30,18 @@ import numpy as np
 import numpy.typing as npt
 
 from studio_core.jit import batch_function, kernel
-from studio_core.kernels.brdf import INV_PI, ONE, SIGNATURE, ZERO, arc_cosine, carray
+from studio_core.kernels.brdf import (
+    DENSITY_SIGNATURE,
+    HALF,
+    INV_PI,
+    ONE,
+    SAMPLE_SIGNATURE,
+    SIGNATURE,
+    ZERO,
+    arc_cosine,
+    carray,
+)
+from studio_core.kernels.sampling import cosine_density, cosine_direction, even_direction
 from studio_core.params import Colour, Value, param
 
 _FALL = 0.5 - 2 / (3 * np.pi)
@@ -85,6 +96,43 @@ def evaluate(shape: Any, wo: Any, count: int, wi: Any, out: Any) -> None:
         b1[k] = lit * lost * max(_GRAZING - _bulge(down), ZERO)
 
 
+@kernel
+def _even_share(r: np.float32, up: np.float32) -> np.float32:
+    """Of the draws of b0, which is bright at grazing angles: b0 cosθ_i ≤ A (1 + r) / π, not less there."""
+    return HALF * r * max(ONE - up, ZERO)
+
+
+@batch_function(SAMPLE_SIGNATURE)
+def sample(shape: Any, wo: Any, term: int, count: int, u: Any, wi: Any) -> None:
+    """By the cosine, b0 in part evenly; see `studio_core.contract.SampledBrdf`."""
+    oz = carray(wo, 3)[2]
+    numbers = carray(u, 2 * count)
+    u0, u1 = numbers[:count], numbers[count:]
+    directions = carray(wi, 3 * count)
+    x, y, z = directions[:count], directions[count : 2 * count], directions[2 * count :]
+    even = _even_share(carray(shape, 3)[0], oz) if term == 0 else ZERO
+    for k in range(count):
+        if u0[k] < even:
+            a, b, c = even_direction(u0[k] / even, u1[k])
+        else:
+            a, b, c = cosine_direction((u0[k] - even) / (ONE - even), u1[k])
+        x[k], y[k], z[k] = a, b, (c if oz > ZERO else -ONE)
+
+
+@batch_function(DENSITY_SIGNATURE)
+def density(shape: Any, wo: Any, count: int, wi: Any, out: Any) -> None:
+    """cos θ / π, for b0 mixed with 1 / 2π; see `studio_core.contract.SampledBrdf`."""
+    oz = carray(wo, 3)[2]
+    z = carray(wi, 3 * count)[2 * count :]
+    terms = carray(out, 2 * count)
+    d0, d1 = terms[:count], terms[count:]
+    even = _even_share(carray(shape, 3)[0], oz)
+    for k in range(count):
+        lit = ONE if (oz > ZERO and z[k] > ZERO) else ZERO
+        d1[k] = lit * cosine_density(z[k])
+        d0[k] = (ONE - even) * d1[k] + even * lit * HALF * INV_PI
+
+
 class OrenNayar:
     """See the module; satisfies `studio_core.contract.Brdf`."""
 
@@ -98,6 +146,16 @@ class OrenNayar:
     def address(self) -> int:
         """Address of `evaluate`."""
         return evaluate.address
+
+    @property
+    def sampler(self) -> int:
+        """Address of `sample`."""
+        return sample.address
+
+    @property
+    def density(self) -> int:
+        """Address of `density`."""
+        return density.address
 
     def shape(self, values: Mapping[str, Value]) -> npt.NDArray[np.float32]:
         """(3,): r, A and the factor of b1."""

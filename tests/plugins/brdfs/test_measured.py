@@ -15,6 +15,7 @@ from oracles.brdf import albedo, ggx, unit
 from studio_core.arrays import frozen_map
 from studio_core.brdfs.calls import evaluate as call
 from studio_core.brdfs.half_difference import grid, to_angles
+from studio_core.kernels.tables import REFERENCE
 from studio_core.params import defaults
 from studio_core.registry import PluginHost
 from studio_core.scene.geometry import Table
@@ -138,7 +139,7 @@ def test_no_more_light_than_arrives_unless_asked() -> None:
     assert kept.max() <= 1.001
     dim = mirrored(0.5)
     sound = MODEL.shape_of(DEFAULTS, {SLOT: dim})
-    np.testing.assert_array_equal(sound[-CURVE:], 1)
+    np.testing.assert_array_equal(sound[REFERENCE : REFERENCE + CURVE], 1)
 
 
 def test_its_own_albedo_is_that_of_adaptive_quadrature() -> None:
@@ -165,7 +166,7 @@ def test_a_tint_leaves_the_shapes_as_they_are() -> None:
     assert not one.problems
     other = dataclasses.replace(material, tables=frozen_map({SLOT: rough(9)}))
     assert not same_shapes(one, shapes(before.with_materials(other), ["m"], HOST))
-    assert len(one.data) < 100
+    assert len(one.data) < 200
 
 
 @pytest.mark.parametrize(
