@@ -11,14 +11,10 @@ import numpy as np
 
 from studio_core.jit import kernel
 from studio_core.kernels.brdf import (
-    HALF,
     INV_PI,
-    LEAST_HEIGHT,
     ONE,
     TWO,
     ZERO,
-    ggx_distribution,
-    smith_factor,
 )
 
 F = np.float32
@@ -102,10 +98,3 @@ def visible_normal(ox: F, oy: F, oz: F, ax: F, ay: F, u0: F, u1: F) -> Vector:
     size = np.sqrt(hx * hx + hy * hy + hz * hz)
     scale = ONE / max(size, LEAST_LENGTH)
     return hx * scale, hy * scale, hz * scale
-
-
-@kernel
-def visible_reflection_density(ox: F, oy: F, oz: F, x: F, y: F, z: F, alpha: F) -> F:
-    """Density of ω_o reflected at a `visible_normal`: G1(ω_o) D(h) / (4 oz), for both heights > 0."""
-    d = ggx_distribution(x + ox, y + oy, max(z + oz, LEAST_HEIGHT), alpha)
-    return HALF * d * smith_factor(oz, alpha)

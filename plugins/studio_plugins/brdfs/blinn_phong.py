@@ -35,19 +35,11 @@ from studio_core.kernels.brdf import (
     ONE,
     SAMPLE_SIGNATURE,
     SIGNATURE,
-    TWO,
     ZERO,
     carray,
     power_of_complement,
 )
-from studio_core.kernels.sampling import (
-    TURN,
-    around_normal,
-    cosine_density,
-    cosine_direction,
-    power_height,
-    reflected,
-)
+from studio_core.kernels.lobes import draw_cosine, draw_half_power, weigh_cosine, weigh_half_power
 from studio_core.params import Value
 from studio_plugins.brdfs.two_lobes import TwoLobeParams, TwoLobes, exponent, sharpness
 
@@ -82,43 +74,19 @@ def evaluate(shape: Any, wo: Any, count: int, wi: Any, out: Any) -> None:
 @batch_function(SAMPLE_SIGNATURE)
 def sample(shape: Any, wo: Any, term: int, count: int, u: Any, wi: Any) -> None:
     """By the cosine, and half vectors by (n·h)^(n+1); see `studio_core.contract.SampledBrdf`."""
-    n = carray(shape, 2)[0]
-    o = carray(wo, 3)
-    ox, oy, oz = o[0], o[1], o[2]
-    numbers = carray(u, 2 * count)
-    u0, u1 = numbers[:count], numbers[count:]
-    directions = carray(wi, 3 * count)
-    x, y, z = directions[:count], directions[count : 2 * count], directions[2 * count :]
-    seen = oz > ZERO
-    for k in range(count):
-        if term == 0:
-            a, b, c = cosine_direction(u0[k], u1[k])
-        else:
-            hx, hy, hz = around_normal(power_height(u0[k], n + ONE), u1[k])
-            facing = ox * hx + oy * hy + oz * hz > ZERO
-            a, b, c = reflected(ox, oy, oz, hx, hy, hz)
-            c = c if facing else -ONE
-        x[k], y[k], z[k] = a, b, (c if seen else -ONE)
+    o, numbers, directions = carray(wo, 3), carray(u, 2 * count), carray(wi, 3 * count)
+    if term == 0:
+        draw_cosine(o, numbers, directions)
+    else:
+        draw_half_power(o, carray(shape, 2)[0] + ONE, numbers, directions)
 
 
 @batch_function(DENSITY_SIGNATURE)
 def density(shape: Any, wo: Any, count: int, wi: Any, out: Any) -> None:
     """cos θ / π and (n + 2) / 2π · (n·h)^(n+1) / (4 ω_o·h); see `studio_core.contract.SampledBrdf`."""
-    n = carray(shape, 2)[0]
-    power, peak = HALF * (n + ONE), (n + TWO) / (TWO * TURN)
-    o = carray(wo, 3)
-    ox, oy, oz = o[0], o[1], o[2]
-    directions = carray(wi, 3 * count)
-    x, y, z = directions[:count], directions[count : 2 * count], directions[2 * count :]
-    terms = carray(out, 2 * count)
-    d0, d1 = terms[:count], terms[count:]
-    for k in range(count):
-        lit = ONE if (oz > ZERO and z[k] > ZERO) else ZERO
-        hx, hy, hz = x[k] + ox, y[k] + oy, max(z[k] + oz, LEAST_HEIGHT)
-        flat, height = hx * hx + hy * hy, hz * hz
-        whole = flat + height
-        d0[k] = lit * cosine_density(z[k])
-        d1[k] = lit * peak * power_of_complement(flat / whole, height / whole, power) / np.sqrt(whole)
+    o, directions, terms = carray(wo, 3), carray(wi, 3 * count), carray(out, 2 * count)
+    weigh_cosine(o, directions, terms[:count])
+    weigh_half_power(o, carray(shape, 2)[0] + ONE, directions, terms[count:])
 
 
 class BlinnPhong(TwoLobes):

@@ -47,13 +47,7 @@ from studio_core.kernels.brdf import (
     schlick_weight,
     smith_factor,
 )
-from studio_core.kernels.sampling import (
-    cosine_density,
-    cosine_direction,
-    reflected,
-    visible_normal,
-    visible_reflection_density,
-)
+from studio_core.kernels.lobes import draw_cosine, draw_visible, weigh_cosine, weigh_visible
 from studio_core.params import Colour, Value, param
 
 LEAST_ALPHA = 1e-4
@@ -102,42 +96,22 @@ def evaluate(shape: Any, wo: Any, count: int, wi: Any, out: Any) -> None:
 @batch_function(SAMPLE_SIGNATURE)
 def sample(shape: Any, wo: Any, term: int, count: int, u: Any, wi: Any) -> None:
     """By the cosine, and by visible normals; see `studio_core.contract.SampledBrdf`."""
+    o, numbers, directions = carray(wo, 3), carray(u, 2 * count), carray(wi, 3 * count)
     alpha = carray(shape, 1)[0]
-    o = carray(wo, 3)
-    ox, oy, oz = o[0], o[1], o[2]
-    numbers = carray(u, 2 * count)
-    u0, u1 = numbers[:count], numbers[count:]
-    directions = carray(wi, 3 * count)
-    x, y, z = directions[:count], directions[count : 2 * count], directions[2 * count :]
-    seen = oz > ZERO
-    up = max(oz, LEAST_HEIGHT)
-    for k in range(count):
-        if term == 0:
-            a, b, c = cosine_direction(u0[k], u1[k])
-        else:
-            hx, hy, hz = visible_normal(ox, oy, up, alpha, alpha, u0[k], u1[k])
-            a, b, c = reflected(ox, oy, oz, hx, hy, hz)
-        x[k], y[k], z[k] = a, b, (c if seen else -ONE)
+    if term == 0:
+        draw_cosine(o, numbers, directions)
+    else:
+        draw_visible(o, alpha, alpha, numbers, directions)
 
 
 @batch_function(DENSITY_SIGNATURE)
 def density(shape: Any, wo: Any, count: int, wi: Any, out: Any) -> None:
     """cos θ / π, and G1 D / (4 n·ω_o) twice; see `studio_core.contract.SampledBrdf`."""
+    o, directions, terms = carray(wo, 3), carray(wi, 3 * count), carray(out, 3 * count)
     alpha = carray(shape, 1)[0]
-    o = carray(wo, 3)
-    ox, oy, oz = o[0], o[1], o[2]
-    directions = carray(wi, 3 * count)
-    x, y, z = directions[:count], directions[count : 2 * count], directions[2 * count :]
-    terms = carray(out, 3 * count)
-    d0, d1, d2 = terms[:count], terms[count : 2 * count], terms[2 * count :]
-    seen = oz > ZERO
-    up = max(oz, ZERO)
-    for k in range(count):
-        lit = ONE if (seen and z[k] > ZERO) else ZERO
-        lobe = lit * visible_reflection_density(ox, oy, up, x[k], y[k], z[k], alpha)
-        d0[k] = lit * cosine_density(z[k])
-        d1[k] = lobe
-        d2[k] = lobe
+    weigh_cosine(o, directions, terms[:count])
+    weigh_visible(o, alpha, directions, terms[count : 2 * count])
+    weigh_visible(o, alpha, directions, terms[2 * count :])
 
 
 class Ggx:

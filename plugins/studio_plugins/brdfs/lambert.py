@@ -20,7 +20,7 @@ import numpy.typing as npt
 
 from studio_core.jit import batch_function
 from studio_core.kernels.brdf import DENSITY_SIGNATURE, ONE, SAMPLE_SIGNATURE, SIGNATURE, ZERO, carray
-from studio_core.kernels.sampling import cosine_density, cosine_direction
+from studio_core.kernels.lobes import draw_cosine, weigh_cosine
 from studio_core.params import Colour, Value, param
 
 
@@ -46,24 +46,15 @@ def evaluate(shape: Any, wo: Any, count: int, wi: Any, out: Any) -> None:
 @batch_function(SAMPLE_SIGNATURE)
 def sample(shape: Any, wo: Any, term: int, count: int, u: Any, wi: Any) -> None:
     """By the cosine; see `studio_core.contract.SampledBrdf`."""
-    seen = carray(wo, 3)[2] > ZERO
-    numbers = carray(u, 2 * count)
-    u0, u1 = numbers[:count], numbers[count:]
-    directions = carray(wi, 3 * count)
-    x, y, z = directions[:count], directions[count : 2 * count], directions[2 * count :]
-    for k in range(count):
-        x[k], y[k], up = cosine_direction(u0[k], u1[k])
-        z[k] = up if seen else -up
+    o, numbers, directions = carray(wo, 3), carray(u, 2 * count), carray(wi, 3 * count)
+    draw_cosine(o, numbers, directions)
 
 
 @batch_function(DENSITY_SIGNATURE)
 def density(shape: Any, wo: Any, count: int, wi: Any, out: Any) -> None:
     """cos θ / π; see `studio_core.contract.SampledBrdf`."""
-    lit = ONE if carray(wo, 3)[2] > ZERO else ZERO
-    z = carray(wi, 3 * count)[2 * count :]
-    d = carray(out, count)
-    for k in range(count):
-        d[k] = lit * cosine_density(z[k])
+    o, directions, terms = carray(wo, 3), carray(wi, 3 * count), carray(out, 1 * count)
+    weigh_cosine(o, directions, terms)
 
 
 class Lambert:

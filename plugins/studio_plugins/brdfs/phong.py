@@ -37,13 +37,7 @@ from studio_core.kernels.brdf import (
     carray,
     power_of_complement,
 )
-from studio_core.kernels.sampling import (
-    TURN,
-    around_mirror,
-    cosine_density,
-    cosine_direction,
-    power_height,
-)
+from studio_core.kernels.lobes import draw_cosine, draw_mirror_power, weigh_cosine, weigh_mirror_power
 from studio_core.params import Value
 from studio_plugins.brdfs.two_lobes import TwoLobeParams, TwoLobes, exponent, sharpness
 
@@ -76,40 +70,20 @@ def evaluate(shape: Any, wo: Any, count: int, wi: Any, out: Any) -> None:
 
 @batch_function(SAMPLE_SIGNATURE)
 def sample(shape: Any, wo: Any, term: int, count: int, u: Any, wi: Any) -> None:
-    """By the cosine, and by cos^n a around the mirror; see `studio_core.contract.SampledBrdf`."""
-    n = carray(shape, 2)[0]
-    o = carray(wo, 3)
-    ox, oy, oz = o[0], o[1], o[2]
-    numbers = carray(u, 2 * count)
-    u0, u1 = numbers[:count], numbers[count:]
-    directions = carray(wi, 3 * count)
-    x, y, z = directions[:count], directions[count : 2 * count], directions[2 * count :]
-    seen = oz > ZERO
-    for k in range(count):
-        if term == 0:
-            a, b, c = cosine_direction(u0[k], u1[k])
-        else:
-            a, b, c = around_mirror(ox, oy, oz, power_height(u0[k], n), u1[k])
-        x[k], y[k], z[k] = a, b, (c if seen else -ONE)
+    """By the cosine, and by cos^n a around the mirror direction; see `studio_core.contract.SampledBrdf`."""
+    o, numbers, directions = carray(wo, 3), carray(u, 2 * count), carray(wi, 3 * count)
+    if term == 0:
+        draw_cosine(o, numbers, directions)
+    else:
+        draw_mirror_power(o, carray(shape, 2)[0], numbers, directions)
 
 
 @batch_function(DENSITY_SIGNATURE)
 def density(shape: Any, wo: Any, count: int, wi: Any, out: Any) -> None:
     """cos θ / π and (n + 1) / 2π · cos^n a; see `studio_core.contract.SampledBrdf`."""
-    n = carray(shape, 2)[0]
-    peak = (n + ONE) / TURN
-    o = carray(wo, 3)
-    ox, oy, oz = o[0], o[1], o[2]
-    directions = carray(wi, 3 * count)
-    x, y, z = directions[:count], directions[count : 2 * count], directions[2 * count :]
-    terms = carray(out, 2 * count)
-    d0, d1 = terms[:count], terms[count:]
-    for k in range(count):
-        dx, dy, dz = x[k] + ox, y[k] + oy, z[k] - oz
-        lit = ONE if (oz > ZERO and z[k] > ZERO) else ZERO
-        t = HALF * (dx * dx + dy * dy + dz * dz)  # 1 − cos a
-        d0[k] = lit * cosine_density(z[k])
-        d1[k] = lit * peak * power_of_complement(t, ONE - t, n)
+    o, directions, terms = carray(wo, 3), carray(wi, 3 * count), carray(out, 2 * count)
+    weigh_cosine(o, directions, terms[:count])
+    weigh_mirror_power(o, carray(shape, 2)[0], directions, terms[count:])
 
 
 class Phong(TwoLobes):
