@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from studio_core.brdfs.half_difference import filled
+from studio_core.brdfs.half_difference import filled, grid
 from studio_core.errors import InputError
 from studio_core.scene.geometry import Table
 
@@ -26,7 +26,7 @@ BRIGHTEST = 1e7  # 1/sr; a mirror as sharp as the first cell gives about 3e6
 
 @dataclass(frozen=True)
 class Measurement:
-    """A half-difference table without gaps, and which share of the file's cells was `invalid`."""
+    """A half-difference table without gaps, and which share of the cells above the surface was `invalid`."""
 
     table: Table
     invalid: float
@@ -62,7 +62,9 @@ def read(path: Path) -> Measurement:
     if brightest > BRIGHTEST:
         told = f"a value of {brightest:.3g} per steradian is no reflectance"
         raise InputError(f"{path} cannot be imported: {told}")
-    return Measurement(Table(filled(scaled, known), path.stem), float(1 - known.mean()))
+    wi, wo = grid(SHAPE)
+    above = (wi[..., 2] > 0) & (wo[..., 2] > 0)
+    return Measurement(Table(filled(scaled, known), path.stem), float(1 - known[above].mean()))
 
 
 def write(path: Path, values: npt.NDArray[np.floating], known: npt.NDArray[np.bool_] | None = None) -> None:

@@ -255,9 +255,15 @@ class Names(Placing):
         self._document.apply(Remove(ids, f"Delete {self.scene[ids[0]].name}" if len(ids) == 1 else "Delete"))
 
     def add_model(self, path: str | Path, at: npt.ArrayLike = (0.0, 0.0, 0.0), unit: float = 1.0) -> Any:
-        """Add a model from a file, standing `at` a point; `unit` is the file's, in metres. The new node."""
+        """Add a model from a file, standing `at` a point; `unit` is the file's, in metres. The new node.
+
+        Of a file with a measured material (`.binary`), the new material.
+        """
         path = Path(path)
         model: ImportedModel = self._run(f"Importing {path.name}", lambda job: self._load(path, unit))
+        if model.materials and not model.nodes:
+            self._document.apply(Add((), model.materials, f"Import {path.stem}"))
+            return self.material(model.materials[0])
         top = Group(id=new_id("group"), name=path.stem)
         held = {node.id for node in model.nodes}
         under = [n if n.parent in held else dataclasses.replace(n, parent=top.id) for n in model.nodes]

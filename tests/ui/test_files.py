@@ -182,6 +182,19 @@ def test_an_absurd_size_asks_for_the_unit(driver: Driver, tmp_path: Path) -> Non
     assert len(driver.document.scene.nodes) == 4
 
 
+def test_a_measured_material_waits_among_the_materials(driver: Driver, tmp_path: Path) -> None:
+    from studio_core.brdfs import merl
+
+    path = tmp_path / "felt.binary"
+    merl.write(path, np.full((*merl.SHAPE, 3), 0.1))
+    nodes = driver.document.scene.nodes
+    driver.window.take_files([path])
+    driver.until(lambda: driver.labels()[-1] == "Import felt")
+    made = list(driver.document.scene.materials.values())[-1]
+    assert (made.name, made.model, driver.answers.asked) == ("felt", "measured", [])
+    assert driver.document.scene.nodes == nodes
+
+
 def test_what_cannot_be_imported_is_told(driver: Driver, tmp_path: Path) -> None:
     path = tmp_path / "model.xyz"
     path.write_text("nothing")

@@ -15,6 +15,7 @@ plugin = Plugin(
             "blinn-phong": f"{_HERE}.blinn_phong:MODEL",
             "ggx": f"{_HERE}.ggx:MODEL",
             "measured": f"{_HERE}.measured:MODEL",
-        }
+        },
+        "importer": {"merl": f"{_HERE}.measured_files:MERL"},
     },
 )

@@ -176,6 +176,15 @@ def test_a_model_stands_where_it_is_put(names: Names, tmp_path: Path) -> None:
         names.add_model(tmp_path / "board.xyz")
 
 
+def test_a_measured_material_comes_from_a_file(names: Names, tmp_path: Path) -> None:
+    from studio_core.brdfs import merl
+
+    merl.write(tmp_path / "felt.binary", np.full((*merl.SHAPE, 3), 0.1))
+    made = names.add_model(tmp_path / "felt.binary")
+    assert (made.name, made.model) == ("felt", "measured")
+    assert names.material("felt") is made
+
+
 def test_pictures_of_light_keep_the_settings(names: Names, tmp_path: Path) -> None:
     from studio_core.imaging.encode import write_exr
 

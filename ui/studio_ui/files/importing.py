@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from studio_core.contract import ImportedModel, Importer
-from studio_core.edits import Move
+from studio_core.edits import Add, Move
 from studio_core.errors import InputError, PluginError
 from studio_core.registry import PluginHost
 from studio_core.scene.arranging import roots
@@ -111,14 +111,18 @@ class Importing:
         path, host = wanted.path, self._context.host
         guess = remembered(self._settings.get(_SETTING, {}), path.suffix.lower())
 
-        def read(job: Job) -> tuple[ImportedModel, ImportQuestion]:
+        def read(job: Job) -> tuple[ImportedModel, ImportQuestion | None]:
             model = importer_of(host, path).load(path)
             job.checkpoint()
-            return model, question(path, model, guess)
+            return model, question(path, model, guess) if model.nodes or not model.materials else None
 
-        def done(found: tuple[ImportedModel, ImportQuestion]) -> None:
+        def done(found: tuple[ImportedModel, ImportQuestion | None]) -> None:
+            model, asked = found
             try:
-                self._answered(wanted, *found)
+                if asked is None:
+                    self._add_materials(path, model)
+                else:
+                    self._answered(wanted, model, asked)
             finally:
                 self._after()
 
@@ -157,13 +161,21 @@ class Importing:
             if empty:
                 self._frame_all()
 
+    def _add_materials(self, path: Path, model: ImportedModel) -> None:
+        """A file that holds materials alone: they wait among the materials until they are used."""
+        for note in model.notes:
+            self._context.journal.write(f"{path.name}: {note}", "warning")
+        names = " and ".join(material.name for material in model.materials)
+        if self._context.editing.apply(Add((), model.materials, f"Import {names}")):
+            self._context.journal.write(f"{names} is among the materials now: drag it onto an object.")
+
     def _filters(self) -> list[Filter]:
         if not self._context.warm:
             return []
         found = self._context.host.available("importer").values()
         filters = [Filter(importer.label, tuple(importer.extensions)) for importer in found]
         every = tuple(e for f in filters for e in f.extensions)
-        return [Filter("All models", every), *filters]
+        return [Filter("All that can be imported", every), *filters]
 
 
 def importer_of(host: PluginHost, path: Path) -> Importer:
