@@ -117,6 +117,7 @@ def assemble(
     thumbnails = thumbnails or user_cache() / "thumbnails"
     host = host or PluginHost.discover(settings.get(OFF, []))
     workers = Workers(threads)
+    aside = files or ComputeThread()
     compute, files = compute or ComputeThread(), files or ComputeThread()
     journal, document, session = Journal(), Document(), Session()
     journal.blame = partial(_blame, host)
@@ -129,12 +130,13 @@ def assemble(
     shading = shading or PluginShading(services)
     feed = PictureFeed(document, session, shading, compute, bridge.post, bridge.later)
     context = Context(document, session, editing, host, journal, tasks, feed, services, compute, bridge.quiet)
+    context.aside = aside
     viewport = SwitchViewport(RasterViewport())
     window = MainWindow(context, viewport, settings, files, _samples(), ask, Thumbnails(thumbnails))
     for failure in host.failures:
         journal.write(f"The plugin {failure.plugin} {failure.what}", "problem", failure.traceback)
     _warm(context, compute, files, bridge)
-    return Studio(window, context, bridge, workers, (compute, files))
+    return Studio(window, context, bridge, workers, (compute, files, aside))
 
 
 def cache_limit(settings: Settings) -> int:

@@ -1,11 +1,13 @@
 """A material's reflectance as curves: its lobe in the plane of incidence, its albedo against the angle.
 
-Both are of the material's own values; pictures on it are left out.
+Both are of the material's values as they are; `averaged` ones stand for pictures that lie on it.
 """
 
 from __future__ import annotations
 
+import dataclasses
 import functools
+from collections.abc import Callable
 
 import numpy as np
 import numpy.typing as npt
@@ -13,6 +15,7 @@ import numpy.typing as npt
 from studio_core.brdfs.albedo import albedo_table, flat_coefficients
 from studio_core.brdfs.calls import evaluate
 from studio_core.preview.fan import Fan, fan
+from studio_core.scene.geometry import Image
 from studio_core.shading.materials import Resolved
 
 F32 = npt.NDArray[np.float32]
@@ -44,6 +47,19 @@ def lobe(resolved: Resolved, incidence: float, *, cosine: bool = True) -> tuple[
     return angles, made * np.cos(turn)[:, None] if cosine else made
 
 
+def averaged(resolved: Resolved, mean: Callable[[Image], F64]) -> Resolved:
+    """The material as it is on average over its pictures; `mean` gives a picture's linear RGB (3,)."""
+    values = dict(resolved.values)
+    for name, texture in resolved.textures.items():
+        colour, value = mean(texture.image), values[name]
+        if isinstance(value, tuple):
+            red, green, blue = (float(v * c) for v, c in zip(value, colour, strict=True))
+            values[name] = (red, green, blue)
+        else:
+            values[name] = float(value) * float(colour[0])
+    return dataclasses.replace(resolved, values=values, textures={})
+
+
 def albedo(resolved: Resolved, angles: npt.ArrayLike, *, quick: bool = False) -> F64:
     """(A, 3) share of the light from degrees (A,) that comes back in all; at 90° that of nearly 90°.
 
@@ -69,4 +85,4 @@ def _fan(angle: float) -> Fan:
     return fan(float(np.cos(np.radians(angle))))
 
 
-__all__ = ["STEEPEST", "albedo", "lobe"]
+__all__ = ["STEEPEST", "albedo", "averaged", "lobe"]

@@ -39,7 +39,8 @@ class Context:
     """Document, session and what serves them. `warm` tells whether models and backends are loaded.
 
     Before that panels must not touch `host.get`: it would import what is heavy on the window's thread.
-    `compute` runs what needs kernels, with `services`; inside `quiet()` results of other threads wait.
+    `compute` runs what needs kernels, with `services`; `aside` what is small and must not wait for pictures;
+    inside `quiet()` results of other threads wait.
     """
 
     document: Document
@@ -54,3 +55,4 @@ class Context:
     quiet: Callable[[], AbstractContextManager[None]] = nullcontext
     warm: bool = False
     warmed: Signal[[]] = field(default_factory=Signal)
+    aside: Executor | None = None

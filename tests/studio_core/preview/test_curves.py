@@ -7,8 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from studio_core.preview.curves import albedo, lobe
+from studio_core.preview.curves import albedo, averaged, lobe
 from studio_core.registry import PluginHost
+from studio_core.scene.geometry import Image, Texture
 from studio_core.scene.nodes import Material
 from studio_core.shading.materials import Resolved, resolve
 from studio_plugins.brdfs import plugin
@@ -55,3 +56,17 @@ def test_quick_albedo_is_the_exact_one_within_a_percent(roughness: float, metall
     made = material("ggx", roughness=roughness, metallic=metallic)
     angles = [0, 40, 70]
     np.testing.assert_allclose(albedo(made, angles, quick=True), albedo(made, angles), atol=0.015)
+
+
+def test_pictures_count_as_their_mean() -> None:
+    halves = np.zeros((4, 8, 3), np.uint8)
+    halves[:, :4] = 255
+    made = Material(
+        id="m",
+        name="M",
+        values={"base_color": (1.0, 0.8, 0.2)},
+        textures={"base_color": Texture(Image(halves))},
+    )
+    flat = averaged(resolve(made, HOST), lambda image: np.array([0.5, 0.5, 0.25]))
+    assert flat.values["base_color"] == pytest.approx((0.5, 0.4, 0.05))
+    assert not flat.textures

@@ -15,12 +15,14 @@ from PySide6.QtWidgets import (
     QLineEdit,
     QSizePolicy,
     QSlider,
+    QToolButton,
     QVBoxLayout,
     QWidget,
 )
 
 from studio_core.params import ParamInfo
 from studio_ui.forms.colour_button import ColourButton
+from studio_ui.forms.colour_menu import ColourMenu
 from studio_ui.forms.hold import Hold
 from studio_ui.forms.sinks import Sink
 from studio_ui.forms.spin import MIXED, Spin
@@ -257,6 +259,22 @@ class ColourField(Field):
         self.button.committed = sink.commit
         self.button.cancelled = sink.cancel
         self.row.addWidget(self.button, 1)
+        self.menu: ColourMenu | None = None
+        if info.high <= 1:
+            self.menu = ColourMenu(self, lambda: self.button.colour)
+            self.menu.gave = lambda colour: sink.apply(name, colour)
+            self.row.addWidget(self._opener(self.menu))
+
+    def _opener(self, menu: ColourMenu) -> QToolButton:
+        opener = QToolButton()
+        opener.setToolTip("Metals, and colours by temperature")
+        opener.setAccessibleName(f"Known colours for {self.info.label}")
+        opener.setProperty("role", "small")
+        opener.setAutoRaise(True)
+        opener.setArrowType(Qt.ArrowType.DownArrow)
+        opener.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
+        opener.setMenu(menu)
+        return opener
 
     def show_value(self, value: Any) -> None:
         """What the scene has."""

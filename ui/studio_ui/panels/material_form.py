@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -11,12 +12,13 @@ from PySide6.QtWidgets import QFileDialog, QToolButton, QVBoxLayout, QWidget
 from studio_core.contract import Brdf
 from studio_core.edits import Compound, Edit, SetMaterial, SetTexture
 from studio_core.errors import PluginError
+from studio_core.metals import Metal
 from studio_core.params import ParamInfo, Value, defaults, param_infos
 from studio_core.scene.geometry import Image, Texture
 from studio_core.scene.nodes import Material, MaterialId
 from studio_core.shading.job import Job
 from studio_ui.context import Context
-from studio_ui.forms.fields import Combo
+from studio_ui.forms.fields import ColourField, Combo
 from studio_ui.forms.param_form import ParamForm, form_label, form_layout
 from studio_ui.forms.sinks import EditSink
 from studio_ui.forms.spin import MIXED
@@ -116,6 +118,9 @@ class MaterialForm(QWidget):
             infos = param_infos(model.Params)
             self.form = ParamForm(infos, self._sink, defaults=defaults(model.Params))
             self._column.addWidget(self.form)
+            for name, field in self.form.fields.items():
+                if isinstance(field, ColourField) and field.menu is not None:
+                    field.menu.metal = partial(self._put_metal, name)
             for name in model.textures if len(materials) == 1 else ():
                 self._column.addWidget(self._texture(materials[0].id, name, infos[name].label))
         elif not self._context.warm:
@@ -181,6 +186,20 @@ class MaterialForm(QWidget):
             else:
                 edits.append(SetMaterial(material, {name: given}, label=label))
         return edits[0] if len(edits) == 1 else Compound(label, tuple(edits))
+
+    def _put_metal(self, name: str, metal: Metal) -> None:
+        """Its colour; where the model tells metals apart, the surface becomes one."""
+        scene = self._context.document.scene
+        edits: list[Edit] = []
+        for chosen in self.materials:
+            model = self._brdf(scene.material(chosen).model)
+            values: dict[str, Value] = {name: metal.colour}
+            if model is not None and "metallic" in param_infos(model.Params):
+                values["metallic"] = 1.0
+            edits.append(SetMaterial(chosen, values))
+        what = scene.material(self.materials[0]).name
+        what = what if len(self.materials) == 1 else f"{len(self.materials)} materials"
+        self._context.editing.apply(Compound(f"{metal.name} for {what}", tuple(edits)))
 
     def _change_model(self, name: str) -> None:
         model = self._brdf(name)

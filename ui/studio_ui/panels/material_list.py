@@ -1,4 +1,4 @@
-"""The scene's materials in a list: swatch, name, how many objects have it; dragged onto what shall."""
+"""The scene's materials in a list: ball, name, how many objects have it; dragged onto what shall."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 
 from PySide6.QtCore import QItemSelectionModel, QMimeData, QPoint, QSignalBlocker, QSize, Qt
-from PySide6.QtGui import QColor, QDrag
+from PySide6.QtGui import QColor, QDrag, QIcon, QShowEvent
 from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QTreeWidget, QTreeWidgetItem
 
 from studio_core.scene.nodes import Material, MaterialId, MeshObject, Scene
@@ -19,12 +19,16 @@ _ROLE = Qt.ItemDataRole.UserRole
 
 
 class MaterialList(QTreeWidget):
-    """`chosen(materials)` and `renamed(material, name)` tell of the hand."""
+    """`chosen(materials)` and `renamed(material, name)` tell of the hand.
+
+    `picture(material, ratio)` is asked while the list is seen; where it has none a swatch stands in.
+    """
 
     def __init__(self) -> None:
         super().__init__()
         self.chosen: Callable[[tuple[MaterialId, ...]], object] = lambda materials: None
         self.renamed: Callable[[MaterialId, str], object] = lambda material, name: None
+        self.picture: Callable[[Material, float], QIcon | None] = lambda material, ratio: None
         self.rows: dict[MaterialId, QTreeWidgetItem] = {}
         self._wanted = ""
         self._shown: dict[MaterialId, tuple[Material, int]] = {}
@@ -75,6 +79,18 @@ class MaterialList(QTreeWidget):
                 if self._shown.get(material) != value:
                     self._shown[material] = value
                     self._draw(item, *value)
+
+    def redraw(self, materials: Iterable[MaterialId] | None = None) -> None:
+        """The pictures of those, or of all, as they are now."""
+        with QSignalBlocker(self):
+            for material in self.rows if materials is None else materials:
+                if material in self._shown and material in self.rows:
+                    self._picture(self.rows[material], self._shown[material][0])
+
+    def showEvent(self, event: QShowEvent) -> None:
+        """Pictures are wanted now."""
+        super().showEvent(event)
+        self.redraw()
 
     def narrow(self, text: str) -> None:
         """Only materials whose names hold `text`."""
@@ -134,13 +150,18 @@ class MaterialList(QTreeWidget):
         item.setData(_NAME, _ROLE, material.id)
         item.setText(_NAME, material.name)
         self._hide(item)
-        item.setIcon(_NAME, swatch(material, self.devicePixelRatioF()))
+        self._picture(item, material)
         item.setText(_USERS, str(users) if users else "unused")
         item.setTextAlignment(_USERS, Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
         item.setForeground(_USERS, QColor(self._theme.dim))
         told = {0: "No object has it", 1: "One object has it"}.get(users, f"{users} objects have it")
         for column in (_NAME, _USERS):
             item.setToolTip(column, f"{material.name}\n{told}\nDrag it onto an object in the picture")
+
+    def _picture(self, item: QTreeWidgetItem, material: Material) -> None:
+        ratio = self.devicePixelRatioF()
+        made = self.picture(material, ratio) if self.isVisible() else None
+        item.setIcon(_NAME, made if made is not None else swatch(material, ratio))
 
     def _changed(self, item: QTreeWidgetItem, column: int) -> None:
         if column == _NAME:

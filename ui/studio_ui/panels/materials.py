@@ -15,13 +15,18 @@ from studio_ui.context import Context
 from studio_ui.forms.fields import Combo
 from studio_ui.forms.param_form import ParamForm
 from studio_ui.look.theme import Theme
+from studio_ui.material_view.strip import MaterialStrip
+from studio_ui.material_view.thumbnails import MaterialThumbnails
+from studio_ui.material_view.work import PreviewWork
 from studio_ui.objects.choosing import meshes_below, users
 from studio_ui.objects.material_drag import assigned
 from studio_ui.panels.material_form import MaterialForm
 from studio_ui.panels.material_list import MaterialList, users_of
 from studio_ui.panels.panel import Panel, row
+from studio_ui.panels.swatch import SIZE
 
 _WHAT_CHANGES_USERS = Aspect.STRUCTURE | Aspect.MATERIAL
+_WHAT_LIGHTS = Aspect.STRUCTURE | Aspect.LIGHT | Aspect.GAIN
 
 
 class MaterialsPanel(Panel):
@@ -42,6 +47,11 @@ class MaterialsPanel(Panel):
         self.find.setAccessibleName("Find a material")
         self.find.setClearButtonEnabled(True)
         self.find.textChanged.connect(self.list.narrow)
+        self.work = PreviewWork(context)
+        self.thumbnails = MaterialThumbnails(context, self.work, SIZE)
+        self.thumbnails.came = lambda material: self.list.redraw((material,))
+        self.list.picture = self.thumbnails.icon
+        self.strip = MaterialStrip(context, self.work)
         self.editor = MaterialForm(context, self.tool)
         add = self.tool("add", "New material")
         copy = self.tool("duplicate", "Duplicate the chosen material")
@@ -62,7 +72,9 @@ class MaterialsPanel(Panel):
         above.addWidget(self.list, 1)
         above.addLayout(row(add, copy, self._delete_button(), self.users, self.assign, self.slot, stretch=4))
         below = QWidget()
-        self.scroller(self.column_of(below)).addWidget(self.editor)
+        beneath = self.column_of(below)
+        beneath.addWidget(self.strip)
+        self.scroller(beneath).addWidget(self.editor)
         split = QSplitter(Qt.Orientation.Vertical)
         split.setChildrenCollapsible(False)
         split.addWidget(top)
@@ -77,8 +89,13 @@ class MaterialsPanel(Panel):
         self.subscriptions.add(
             context.document.changed.connect(self._edited),
             context.session.selected.connect(self._selected),
-            context.warmed.connect(self.refresh),
+            context.session.displayed.connect(self._pictures),
+            context.editing.settled.connect(self._pictures),
+            context.warmed.connect(self._warmed),
         )
+        self._relit = QTimer(self)
+        self._relit.setSingleShot(True)
+        self._relit.timeout.connect(self.list.redraw)
         self.refresh()
 
     def _delete_button(self) -> QToolButton:
@@ -105,9 +122,16 @@ class MaterialsPanel(Panel):
         """What all materials have."""
         return self.editor.common
 
+    def close_panel(self) -> None:
+        """Stop listening and making."""
+        super().close_panel()
+        self.strip.close_strip()
+        self.work.close()
+
     def set_theme(self, theme: Theme) -> None:
         """Other colours."""
         super().set_theme(theme)
+        self.strip.set_theme(theme)
         self.list.set_theme(theme)
         self.refresh()
 
@@ -125,6 +149,15 @@ class MaterialsPanel(Panel):
             self.list.select_materials(self.chosen)
         self._offer_slots()
         self.editor.show_materials(self.chosen)
+        self.strip.show_material(self.material)
+
+    def _warmed(self) -> None:
+        self.work.warmed()
+        self.refresh()
+        self.list.redraw()
+
+    def _pictures(self) -> None:
+        self._relit.start(0)
 
     def choose(self, material: MaterialId) -> None:
         """Show that material."""
@@ -140,11 +173,14 @@ class MaterialsPanel(Panel):
         if materials:
             self.chosen = materials
             self.editor.show_materials(materials)
+            self.strip.show_material(self.material)
             self._offer_slots()
 
     def _edited(self, before: Scene, after: Scene, changes: Changes) -> None:
         if changes.materials or changes.aspects & _WHAT_CHANGES_USERS:
             self._soon.start(0)
+        if changes.aspects & _WHAT_LIGHTS and not self.context.editing.busy:
+            self._pictures()
 
     def _selected(self) -> None:
         meshes = self._meshes()

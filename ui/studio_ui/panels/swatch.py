@@ -1,4 +1,4 @@
-"""A small round sample of a material: its main colour, lit from the upper left, shiny where it is smooth."""
+"""A small round sample of a material, until its ball is there: main colour, shiny where it is smooth."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from PySide6.QtGui import QColor, QIcon, QPainter, QPixmap, QRadialGradient
 from studio_core.scene.nodes import Material
 from studio_ui.forms.colour_button import to_display
 
-SIZE = 26
+SIZE = 30
 _COLOURS = ("base_color", "color", "diffuse", "albedo", "reflectance")
 
 

@@ -1,0 +1,1 @@
+"""How a material looks: its ball in the scene's light, its lobe, its albedo, thumbnails."""
