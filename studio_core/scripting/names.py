@@ -257,7 +257,7 @@ class Names(Placing):
     def add_model(self, path: str | Path, at: npt.ArrayLike = (0.0, 0.0, 0.0), unit: float = 1.0) -> Any:
         """Add a model from a file, standing `at` a point; `unit` is the file's, in metres. The new node.
 
-        Of a file with a measured material (`.binary`), the new material.
+        Of a file with a measured material (`.binary`, `.astm`, `.csv`), the new material.
         """
         path = Path(path)
         model: ImportedModel = self._run(f"Importing {path.name}", lambda job: self._load(path, unit))

@@ -16,6 +16,9 @@ plugin = Plugin(
             "ggx": f"{_HERE}.ggx:MODEL",
             "measured": f"{_HERE}.measured:MODEL",
         },
-        "importer": {"merl": f"{_HERE}.measured_files:MERL"},
+        "importer": {
+            "merl": f"{_HERE}.measured_files:MERL",
+            "tabulated": f"{_HERE}.measured_files:TABULATED",
+        },
     },
 )

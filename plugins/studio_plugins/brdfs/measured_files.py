@@ -7,7 +7,8 @@ from pathlib import Path
 import numpy as np
 
 from studio_core.arrays import frozen_map
-from studio_core.brdfs import merl
+from studio_core.brdfs import merl, tabulated
+from studio_core.brdfs.scattered import table_of
 from studio_core.contract import ImportedModel
 from studio_core.scene.geometry import Table
 from studio_core.scene.nodes import Material, new_id
@@ -32,6 +33,18 @@ class Merl:
         return measured_model(found.table, notes)
 
 
+class Tabulated:
+    """Text by directions and wavelengths; satisfies `studio_core.contract.Importer`."""
+
+    label = "Measured material (table)"
+    extensions: tuple[str, ...] = (".astm", ".csv")
+
+    def load(self, path: Path, unit: float = 1.0) -> ImportedModel:
+        """One material, and what was left out, cut or guessed."""
+        found = tabulated.read(path)
+        return measured_model(table_of(found.samples, found.name), list(found.notes))
+
+
 def measured_model(table: Table, notes: list[str]) -> ImportedModel:
     """A material of the table, which is named as the table is."""
     most = MODEL.albedo(table).max(axis=1)
@@ -47,4 +60,4 @@ def measured_model(table: Table, notes: list[str]) -> ImportedModel:
     return ImportedModel((), (material,), tuple(notes))
 
 
-MERL = Merl()
+MERL, TABULATED = Merl(), Tabulated()
