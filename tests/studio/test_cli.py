@@ -419,8 +419,11 @@ def test_no_verb_without_a_window_loads_qt(files: Path) -> None:
         ["script", "script.py"],
         ["precompute", "made.lucarne", *QUICK],
         ["capture", "--equirect", "all.jpg", "-o", "light.exr", "--set", "stitch.width=64"],
+        ["fit-brdf", "chalk.csv", "--model", "lambert", "-o", "chalk.lucmat"],
         ["doctor"],
     ]
+    rows = "".join(f"{i},{o},{p},0.1,0.1,0.1\n" for i in (0, 40) for o in (10, 50) for p in (0, 90, 180))
+    (files / "chalk.csv").write_text("theta_i,theta_o,phi,R,G,B\n" + rows)
     assert {command[0] for command in commands} | {"bench", "stress"} == set(VERBS)
     source = f"""
 import sys
@@ -798,7 +801,9 @@ def test_a_script_may_exit_and_be_stopped(files: Path, run: Run) -> None:
 
 def test_the_reference_names_every_verb_and_option() -> None:
     text = (ROOT / "docs" / "command-line.md").read_text()
-    sections = dict(re.findall(r"^## `lucarne (\w+)[^\n]*\n(.*?)(?=^## |\Z)", text, re.MULTILINE | re.DOTALL))
+    sections = dict(
+        re.findall(r"^## `lucarne ([\w-]+)[^\n]*\n(.*?)(?=^## |\Z)", text, re.MULTILINE | re.DOTALL)
+    )
     groups = dict(re.findall(r"^## ([A-Z][\w ]*)\n(.*?)(?=^## |\Z)", text, re.MULTILINE | re.DOTALL))
     (verbs,) = (action for action in parser()._actions if action.dest == "verb")
     assert isinstance(verbs.choices, dict)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from pathlib import Path
 from typing import Any
 
@@ -190,5 +191,5 @@ def test_what_is_wrong_is_said_in_one_sentence(tmp_path: Path, text: str, words:
 def test_no_bytes_do_harm(tmp_path_factory: pytest.TempPathFactory, data: bytes, tail: str) -> None:
     path = tmp_path_factory.mktemp("any") / "any.csv"
     path.write_bytes(b"theta_i,theta_o,phi,500nm\n" * (len(data) % 2) + data + tail.encode())
-    with pytest.raises(InputError):
+    with contextlib.suppress(InputError):
         tabulated.read(path)
