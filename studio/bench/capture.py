@@ -62,10 +62,12 @@ COVERED = 0.005
 
 @dataclass(frozen=True)
 class Setup:
-    """How much is measured: phones a map, pixels of the circle's radius, columns of the environment."""
+    """How much is measured: phones a map, pixels of the circle's radius, phones a map that are registered only,
+    columns of the environment."""
 
     phones: int = 2
     radius: float = 300.0
+    registered: int = 6
     width: int = 1024
     captures: int = 200
     heaps: int = 20
@@ -73,7 +75,9 @@ class Setup:
     megapixels: float = 12.0
 
 
-QUICK = Setup(phones=1, radius=220.0, width=512, captures=24, heaps=2, clone=(500, 500), megapixels=1.0)
+QUICK = Setup(
+    phones=1, radius=220.0, registered=1, width=512, captures=24, heaps=2, clone=(500, 500), megapixels=1.0
+)
 
 
 def run(report: Report, program: Headless) -> None:
@@ -97,9 +101,14 @@ def _others(report: Report, program: Headless, setup: Setup, maps: Mapping[str, 
         capture_clone,
         capture_pipeline,
         capture_reflections,
+        capture_registration,
         capture_removal,
     )
 
+    if report.wants(capture_registration.CASE) and maps:
+        rooms = {name: read_map(path) for name, path in maps.items()}
+        capture_registration.measure(report, program, rooms, setup.registered, setup.radius)
+        report.keep()
     if report.wants("brackets") and maps:
         rooms = {name: read_map(path) for name, path in maps.items()}
         capture_brackets.measure(report, rooms, setup.heaps)
@@ -145,6 +154,12 @@ def deep_arcs(phone: Phone, seed: int) -> Phone:
     depths = lens.fov / 2 - 90 + rng.uniform(2, 4, len(phone.arcs))
     arcs = tuple(replace(arc, depth=float(d)) for arc, d in zip(phone.arcs, depths, strict=True))
     return replace(phone, lens=lens, arcs=arcs)
+
+
+def drawn_phone(room: F32, index: int, seed: int, radius: float) -> Phone:
+    """A phone of the set that nothing was tuned on, with reflections and a ladder that suits the room."""
+    phone = deep_arcs(random_phone(100 * index + seed, False, radius=radius, reflections=True), seed)
+    return replace(phone, evs=ladder_of(room, phone))
 
 
 def ladder_of(room: F32, phone: Phone) -> tuple[float, ...]:
@@ -218,10 +233,7 @@ def _over_phones(
     found: dict[tuple[str, str], list[float]] = {}
     details: dict[str, list[dict[str, object]]] = {}
     for seed in range(setup.phones):
-        drawn = deep_arcs(
-            random_phone(100 * index + seed, False, radius=setup.radius, reflections=True), seed
-        )
-        drawn = replace(drawn, evs=ladder_of(room, drawn))
+        drawn = drawn_phone(room, index, seed, setup.radius)
         shots: Shots | None = None
         capture: CaptureRun | None = None
         within = dimmed(room, drawn)

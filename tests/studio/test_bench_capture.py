@@ -14,7 +14,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from studio.bench import capture, capture_clone, capture_measure, capture_reflections
+from studio.bench import (
+    capture,
+    capture_clone,
+    capture_measure,
+    capture_reflections,
+    capture_registration,
+)
 from studio.bench.harness import Report
 from studio.bench.phone import Arc, Phone, Shots, shoot
 from studio.bench.phone_optics import look_up
@@ -216,7 +222,7 @@ class Perfect:
     def open(self, services: Any) -> Perfect:
         return self
 
-    def run(self, photographs: Sequence[Any], settings: Any, job: Any) -> CaptureState:
+    def run(self, photographs: Sequence[Any], settings: Any, job: Any, until: str = "") -> CaptureState:
         self.asked.append(settings)
         digests = [p.digest for p in photographs]
         shots = next(s for s in self.taken if [p.digest for p in (*s.front, *s.back)] == digests)
@@ -266,6 +272,34 @@ def test_rows_of_every_case(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
     assert found["clone", "rel_error"] < 1e-6
     assert [s.reflections.automatic for s in photographer.asked] == [True, False, True, True, True]
     assert all(len(s.bracket.shots) == 6 for s in photographer.asked)
+
+
+def test_registration_of_many_phones(monkeypatch: pytest.MonkeyPatch) -> None:
+    photographer = Perfect(room())
+
+    def recorded(*arguments: Any) -> Shots:
+        photographer.taken.append(shoot(*arguments))
+        return photographer.taken[-1]
+
+    def refused_or_off(photographs: Any, settings: Any, job: Any, until: str = "") -> CaptureState:
+        assert until == "registration"
+        state = Perfect.run(photographer, photographs, settings, job)
+        number, found = len(photographer.taken), state.registration
+        assert found is not None
+        turned = euler(0.0, 0.0, (0.1, 0.2, 9.0, 0.4)[number - 1]) @ found.rotation
+        return replace(state, registration=replace(found, rotation=turned, trusted=number != 3))
+
+    monkeypatch.setattr(capture_registration, "shoot", recorded)
+    monkeypatch.setattr(photographer, "run", refused_or_off)
+    services = SimpleNamespace(get=lambda kind, name: photographer)
+    monkeypatch.setattr(Headless, "registry", property(lambda program: services))
+    report = Report("capture", quick=True)
+    capture_registration.measure(report, Headless(quiet=True), {"a": room(), "b": room()}, 2, 30.0)
+    rows = {row.metric: row.value for row in report.rows}
+    assert rows["captures"] == 4
+    assert rows["unregistered"] == 0.25
+    assert rows["registration_median"] == pytest.approx(0.2, abs=1e-6)
+    assert rows["registration_deg"] == pytest.approx(0.4, abs=1e-6)
 
 
 def test_curves_that_differ_by_a_factor_are_one() -> None:
