@@ -62,8 +62,10 @@ COVERED = 0.005
 
 @dataclass(frozen=True)
 class Setup:
-    """How much is measured: phones a map, pixels of the circle's radius, phones a map that are registered only,
-    columns of the environment."""
+    """How much is measured: phones a map, pixels of the circle's radius, columns of the environment.
+
+    registered: phones a map that are only registered.
+    """
 
     phones: int = 2
     radius: float = 300.0
