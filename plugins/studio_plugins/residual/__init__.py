@@ -1,0 +1,20 @@
+"""Residual materials: photographs under known lights become a reflectance model and a map of what it lacks.
+
+After residual-srf.txt (Ma et al., "An Efficient Representation of Complex Materials for Real-Time
+Rendering"): f = f_r + δ*, with δ* = s(P) · H at each texel. Everything here works on arrays, without a
+window.
+
+- what is known: `samples` (lights, ball, samples), `lights` (angles, names, `.lp` files, mirror ball)
+- from pictures: `pictures` (a folder's files), `ball` (where the sphere is, to a fraction of a pixel),
+  `reflectance_map`
+- the fit: `parametric` (f_r), `bases` (δ*), `tables` (what all texels share), `masks`, `solve` (rank-aware,
+  robust), `refine` (light directions and strengths), `fit` puts them in order and chooses
+- what came of it: `result`, `errors`, `splits`, `frames` (tangent space)
+
+Values are radiance under a light of strength 1, by which a white matte surface that faces it has the value 1
+(irradiance π). The camera looks along −z: x to the right, y up, z towards the camera.
+"""
+
+from studio_core.contract import API, Plugin
+
+plugin = Plugin(id="residual", label="Residual materials: cloth and stone from photographs", api=API)
