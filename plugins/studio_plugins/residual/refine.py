@@ -33,6 +33,9 @@ def refined(samples: Samples, shared: Shared, extra: F32, use: Flags) -> Lights:
         directions[i], gains[i, 0] = _one(samples, i, shared, extra, use[i])
     gains /= np.median(gains)
     lights = samples.lights
+    parametric = shared.parametric
+    if parametric.matte_terms == len(parametric.colours):
+        directions = _without_spread(lights.directions, directions)
     return Lights(
         directions, lights.strengths * gains, lights.names, f"{lights.source}, refined".lstrip(", ")
     )
@@ -85,6 +88,17 @@ def _one(samples: Samples, index: int, shared: Shared, extra: F32, use: Flags) -
     x = (found.x - 1) * _UNIT
     made = towards + x[0] * across + x[1] * up
     return made / np.linalg.norm(made), float(np.exp(x[2]))
+
+
+def _without_spread(told: F64, found: F64) -> F64:
+    """Found directions without what all have in common: being further from the camera, or nearer to it.
+
+    Without a highlight a matte surface that is a little less than Lambert's looks like lights further out.
+    """
+    away = np.stack([told[:, 0] * told[:, 2], told[:, 1] * told[:, 2], told[:, 2] ** 2 - 1], axis=1)
+    common = float(((found - told) * away).sum()) / max(float((away**2).sum()), 1e-12)
+    made = found - common * away
+    return np.asarray(made / np.linalg.norm(made, axis=1, keepdims=True), np.float64)
 
 
 def _few(which: Indices, most: int, rng: np.random.Generator) -> Indices:
