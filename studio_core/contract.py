@@ -96,10 +96,10 @@ class SampledBrdf(Brdf, Protocol):
         void density(const float* shape, const float* wo, int64 count, const float* wi, float* out)
 
     u is u0[count], u1[count] in [0, 1), wi becomes x[count], y[count], z[count]: unit directions about
-    proportional to term × cosine, or any vector with z ≤ 0 where there is none. Best is a map that is
-    smooth, and periodic in u1. `out` is the density per steradian with which each term draws wi: term 0
-    [count], term 1 [count], …, and 0 for z ≤ 0; it integrates to the share of u that gives a direction.
-    Wherever term × cosine is not 0 the density is not, and their ratio is bounded. Finite always.
+    proportional to term × cosine, or any vector with z ≤ 0 where there is none. `out` is the density per
+    steradian with which each term draws wi: term 0 [count], term 1 [count], …, and 0 for z ≤ 0; it
+    integrates to the share of u that gives a direction. Wherever term × cosine is not 0 the density is
+    not, and their ratio is bounded. Finite always.
     """
 
     @property

@@ -17,6 +17,7 @@ SUITES = {
         "window": "studio.bench.window",
         "photograph": "studio.bench.photograph",
         "capture": "studio.bench.capture",
+        "materials": "studio.bench.materials",
     },
     "stress": {"ui": "studio.bench.stress_ui"},
 }

@@ -1,8 +1,7 @@
 """How much light a material returns, by the angle it is seen from: directional and mean albedo.
 
 E(ω_o) = ∫ f_r cos θ_i dω_i. Integrals are of the scalar terms, which depend on the shape alone; so a change
-of colour costs nothing. Models that draw directions are summed over a lattice of their own samples until four
-lattices agree; the others, and whatever does not settle, by adaptive quadrature.
+of colour costs nothing.
 """
 
 from __future__ import annotations
@@ -11,32 +10,27 @@ import hashlib
 import threading
 from collections import OrderedDict
 from collections.abc import Mapping
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from studio_core.brdfs.calls import density, evaluate, is_sampled, sample
+from studio_core.brdfs.calls import evaluate
 from studio_core.brdfs.quadrature import over_hemisphere
-from studio_core.contract import Brdf, SampledBrdf
+from studio_core.contract import Brdf
 from studio_core.params import Value
 
 F32 = npt.NDArray[np.float32]
 F64 = npt.NDArray[np.float64]
 
-TOLERANCE = 1e-3  # of a term's albedo there, or of a tenth of its largest
+TOLERANCE = 1e-4  # of a term's albedo there, or of a tenth of its largest, a box
 LEAST = 0.1
 STEEPEST = np.radians(89.9)
-LATTICES = ((377, 233), (1597, 987), (6765, 4181), (28657, 17711))  # Fibonacci numbers
-SHIFTS = ((0.125, 0.25), (0.375, 0.0), (0.625, 0.75), (0.875, 0.5))
-BOX = 0.1  # a box's part of the tolerance
 KEPT = 256
-_DOWN = np.array([0, 0, -1], np.float32)
-_BELOW_ONE = np.nextafter(np.float32(1), np.float32(0))
 
 
 def albedo_table(brdf: Brdf, values: Mapping[str, Value], angles: npt.ArrayLike, azimuth: float = 0.0) -> F64:
-    """(A, 3) directional albedo at angles (A,) from the normal, in radians, within 0.1 %.
+    """(A, 3) directional albedo at angles (A,) from the normal, in radians, within 0.1 % up to 89°.
 
     Angles beyond 89.9° are taken as that: at 90° nothing is seen. `azimuth` in radians from the tangent
     tells for anisotropic models.
@@ -64,29 +58,36 @@ def flat_coefficients(brdf: Brdf, values: Mapping[str, Value]) -> F64:
     return np.asarray(brdf.coefficients(numbers), np.float64).reshape(brdf.terms, 3)
 
 
-def term_albedo(
-    brdf: Brdf, shape: F32, angles: npt.ArrayLike, azimuth: float = 0.0, tolerance: float = TOLERANCE
-) -> F64:
+def term_albedo(brdf: Brdf, shape: F32, angles: npt.ArrayLike, azimuth: float = 0.0) -> F64:
     """(A, terms) ∫ b_k cos θ dω, kept while shape and angles stay."""
     theta = np.minimum(np.atleast_1d(np.asarray(angles, np.float64)), STEEPEST)
     digest = hashlib.blake2b(np.ascontiguousarray(shape, np.float32).data, digest_size=16).digest()
-    key = (brdf.address, brdf.terms, digest, theta.tobytes(), float(azimuth), tolerance)
+    key = (brdf.address, brdf.terms, digest, theta.tobytes(), float(azimuth))
     found = _KNOWN.get(key)
     if found is None:
-        found = _term_albedo(brdf, shape, theta, azimuth, tolerance)
+        sine = np.sin(theta)
+        wo = np.stack([sine * np.cos(azimuth), sine * np.sin(azimuth), np.cos(theta)], 1)
+        found = quadrature_albedo(brdf, shape, wo, TOLERANCE, LEAST)
         found.flags.writeable = False
         _KNOWN.put(key, found)
     return found
 
 
-def quadrature_albedo(brdf: Brdf, shape: F32, wo: npt.ArrayLike, tolerance: npt.ArrayLike) -> F64:
-    """(R, terms) ∫ b_k cos θ dω by adaptive quadrature alone, for wo (R, 3); see `over_hemisphere`."""
+def quadrature_albedo(
+    brdf: Brdf, shape: F32, wo: npt.ArrayLike, tolerance: float, floor: float | None = None
+) -> F64:
+    """(R, terms) ∫ b_k cos θ dω for wo (R, 3); tolerance and floor as in `over_hemisphere`."""
     directions = np.atleast_2d(np.asarray(wo, np.float32))
 
     def integrand(row: int, wi: F32) -> F32:
         return evaluate(brdf, shape, directions[row], wi) * wi[:, 2:]
 
-    return over_hemisphere(integrand, directions, tolerance)
+    return over_hemisphere(integrand, directions, tolerance, floor)
+
+
+def forget() -> None:
+    """Drop what was kept, so that the next table is integrated."""
+    _KNOWN.clear()
 
 
 class _Known:
@@ -103,6 +104,10 @@ class _Known:
                 self._kept.move_to_end(key)
             return found
 
+    def clear(self) -> None:
+        with self._lock:
+            self._kept.clear()
+
     def put(self, key: object, value: F64) -> None:
         with self._lock:
             self._kept[key] = value
@@ -113,52 +118,4 @@ class _Known:
 _KNOWN = _Known()
 
 
-def _term_albedo(brdf: Brdf, shape: F32, theta: F64, azimuth: float, tolerance: float) -> F64:
-    sine = np.sin(theta)
-    wo = np.stack([sine * np.cos(azimuth), sine * np.sin(azimuth), np.cos(theta)], 1).astype(np.float32)
-    made = np.zeros((len(wo), brdf.terms))
-    left = np.arange(len(wo))
-    if is_sampled(brdf):
-        for points in (_lattice(*lattice) for lattice in LATTICES):
-            each = np.array([_by_samples(cast(SampledBrdf, brdf), shape, wo[row], points) for row in left])
-            made[left] = each.mean(axis=1)
-            scale = np.maximum(made[left], LEAST * made.max(axis=0))
-            left = left[(np.ptp(each, axis=1) > 2 * tolerance * scale).any(axis=1)]
-            if not len(left):
-                return made
-    else:
-        rough = quadrature_albedo(brdf, shape, wo, np.inf)
-        made[:] = rough
-    scale = np.maximum(made[left], LEAST * made.max(axis=0))
-    made[left] = quadrature_albedo(brdf, shape, wo[left], BOX * tolerance * scale)
-    return made
-
-
-def _lattice(count: int, step: int) -> F32:
-    """(4 · count, 2): a lattice under each shift; folded along u0, where maps are not periodic."""
-    i = np.arange(count)
-    every = []
-    for a, b in SHIFTS:
-        u0, u1 = (i + a) / count % 1.0, (i * step / count + b) % 1.0
-        every.append(np.stack([1 - np.abs(2 * u0 - 1), u1], 1))
-    return np.minimum(np.concatenate(every).astype(np.float32), _BELOW_ONE)
-
-
-def _by_samples(brdf: SampledBrdf, shape: F32, wo: F32, u: F32) -> F64:
-    """(shifts, terms) from each lattice."""
-    made = np.zeros((len(SHIFTS), brdf.terms))
-    left = list(range(brdf.terms))
-    while left:
-        wi = sample(brdf, shape, wo, left[0], u)
-        wi = np.where(wi[:, 2:] > 0, wi, _DOWN)
-        drawn = density(brdf, shape, wo, wi)
-        own = drawn[:, left[0]]
-        alike = [k for k in left if np.array_equal(drawn[:, k], own)]  # most terms share a lobe
-        weight = np.divide(wi[:, 2], own, out=np.zeros_like(own), where=own > 0)[:, None]
-        values = evaluate(brdf, shape, wo, wi)[:, alike] * weight
-        made[:, alike] = values.reshape(len(SHIFTS), -1, len(alike)).mean(axis=1, dtype=np.float64)
-        left = [k for k in left if k not in alike]
-    return made
-
-
-__all__ = ["albedo_table", "flat_coefficients", "mean_albedo", "quadrature_albedo", "term_albedo"]
+__all__ = ["albedo_table", "flat_coefficients", "forget", "mean_albedo", "quadrature_albedo", "term_albedo"]

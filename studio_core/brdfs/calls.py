@@ -7,6 +7,7 @@ interpreter lock.
 from __future__ import annotations
 
 import ctypes
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -46,12 +47,26 @@ def density(brdf: SampledBrdf, shape: F32, wo: npt.ArrayLike, wi: npt.ArrayLike)
     return _values(_EVALUATE(brdf.density), brdf.terms, shape, wo, wi)
 
 
+def repeatable(brdf: Brdf, shape: F32, wo: npt.ArrayLike, wi: npt.ArrayLike) -> Callable[[], F32]:
+    """`evaluate` with everything prepared: each call runs the kernel alone, into the same array."""
+    return _repeatable(_EVALUATE(brdf.address), brdf.terms, shape, wo, wi)
+
+
 def _values(call: Any, terms: int, shape: F32, wo: npt.ArrayLike, wi: npt.ArrayLike) -> F32:
+    return _repeatable(call, terms, shape, wo, wi)()
+
+
+def _repeatable(call: Any, terms: int, shape: F32, wo: npt.ArrayLike, wi: npt.ArrayLike) -> Callable[[], F32]:
     data, direction, columns = _shape(shape), _one(wo), _columns(wi, 3)
-    count = columns.shape[1]
-    out = np.zeros((terms, count), np.float32)
-    call(data.ctypes.data, direction.ctypes.data, count, columns.ctypes.data, out.ctypes.data)
-    return out.T
+    out = np.zeros((terms, columns.shape[1]), np.float32)
+    arrays = data, direction, columns, out  # kept alive by the closure
+    places = [array.ctypes.data for array in arrays]
+
+    def again() -> F32:
+        call(places[0], places[1], arrays[2].shape[1], places[2], places[3])
+        return arrays[3].T
+
+    return again
 
 
 def _shape(shape: F32) -> F32:
@@ -72,4 +87,4 @@ def _columns(values: npt.ArrayLike, width: int) -> F32:
     return np.ascontiguousarray(rows.T)
 
 
-__all__ = ["density", "evaluate", "is_sampled", "sample"]
+__all__ = ["density", "evaluate", "is_sampled", "repeatable", "sample"]

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import numpy.typing as npt
 
 from studio_core.brdfs.albedo import flat_coefficients, quadrature_albedo, term_albedo
 from studio_core.brdfs.calls import density, evaluate, sample
-from studio_core.brdfs.ranges import colour_corners, shaped, shaping
+from studio_core.brdfs.ranges import colour_corners
 from studio_core.contract import Brdf, SampledBrdf
+from studio_core.params import Value
 
 F32 = npt.NDArray[np.float32]
 F64 = npt.NDArray[np.float64]
@@ -38,36 +39,22 @@ def hard_directions(count: int, seed: int = 5) -> F32:
     return np.asarray(both / np.linalg.norm(both, axis=1, keepdims=True), np.float32)
 
 
-@dataclass(frozen=True)
-class Furnace:
-    """Least and largest albedo over every corner of the colours: (fractions of the shape, angles)."""
+def furnace(
+    brdf: Brdf, materials: Sequence[Mapping[str, Value]], angles: npt.ArrayLike, azimuths: npt.ArrayLike = 0.0
+) -> tuple[F64, F64]:
+    """(M, A) least and largest albedo over all channels and every corner of what is not shape.
 
-    low: F64
-    high: F64
-    fractions: F64
-    angles: F64
-
-
-def furnace(brdf: Brdf, fractions: npt.ArrayLike, angles: npt.ArrayLike, exact: bool = True) -> Furnace:
-    """What comes back under a white sky, by adaptive quadrature or as `albedo_table` has it.
-
-    Fractions are of the way of all parameters of the shape; models without any give one row.
+    For the shapes of some materials (`ranges.shapes`), by adaptive quadrature.
     """
-    theta = np.asarray(angles, np.float64)
-    steps = np.asarray(fractions, np.float64) if shaping(brdf)[0] else np.zeros(1)
-    low, high = np.full((len(steps), len(theta)), np.inf), np.zeros((len(steps), len(theta)))
-    for row, fraction in enumerate(steps):
-        values = shaped(brdf, float(fraction))
-        shape = brdf.shape(values)
-        if exact:
-            terms = quadrature_albedo(brdf, shape, seen_from(theta), EXACT)
-        else:
-            terms = term_albedo(brdf, shape, theta)
+    wo = seen_from(angles, azimuths)
+    low, high = np.full((len(materials), len(wo)), np.inf), np.full((len(materials), len(wo)), -np.inf)
+    for row, values in enumerate(materials):
+        terms = quadrature_albedo(brdf, brdf.shape(values), wo, EXACT)
         for corner in colour_corners(brdf):
             albedo = terms @ flat_coefficients(brdf, {**values, **corner})
             low[row] = np.minimum(low[row], albedo.min(axis=1))
             high[row] = np.maximum(high[row], albedo.max(axis=1))
-    return Furnace(low, high, steps, theta)
+    return low, high
 
 
 def reciprocity(brdf: Brdf, shape: F32, directions: F32) -> float:
@@ -95,4 +82,4 @@ def weight_bound(brdf: SampledBrdf, shape: F32, wo: F32, term: int, u: F32, othe
     return float(weight[value > 1e-30].max(initial=0.0)) / largest
 
 
-__all__ = ["Furnace", "furnace", "hard_directions", "reciprocity", "seen_from", "weight_bound"]
+__all__ = ["furnace", "hard_directions", "reciprocity", "seen_from", "weight_bound"]

@@ -15,12 +15,13 @@ import numpy.typing as npt
 
 F32 = npt.NDArray[np.float32]
 F64 = npt.NDArray[np.float64]
+Tolerance = float | F64 | Callable[[F64], F64]
 Integrand = Callable[[int, F32], npt.NDArray[np.floating]]
 """Values (N, K) at wi (N, 3) for the row of wo given first."""
 
 GRADE = 14.0
-FIRST = (6, 4)  # boxes of the hemisphere along s and φ; the horizon may bend sharply at φ = ±π/2
-POINTS = 5
+FIRST = (4, 4)  # boxes of the hemisphere along s and φ; the horizon may bend sharply at φ = ±π/2
+POINTS = 7
 ROUNDS = 16
 
 
@@ -52,16 +53,19 @@ class MirrorFrame:
         made: F64 = np.arctan2(self.height[row], -self.reach[row] * np.cos(phi))
         return made
 
-    def directions(self, row: npt.NDArray[np.int64], s: F64, phi: F64) -> tuple[F64, F64]:
-        """wi (…, 3), and the solid angle per s and φ (…)."""
+    def directions(self, row: npt.NDArray[np.int64], s: F64, phi: F64) -> tuple[F32, F64]:
+        """wi (…, 3), and the solid angle per s and φ (…), of arrays that are broadcast."""
         end = self.horizon(row, phi)
-        theta = end * np.expm1(GRADE * s) / np.expm1(GRADE)
-        stretch = end * GRADE * np.exp(GRADE * s) / np.expm1(GRADE)
-        sine = np.sin(theta)
-        wi = np.cos(theta)[..., None] * self.mirror[row]
-        wi += (sine * np.cos(phi))[..., None] * self.up[row]
-        wi += (sine * np.sin(phi))[..., None] * self.aside[row]
-        return wi, sine * stretch
+        theta = end * (np.expm1(GRADE * s) / np.expm1(GRADE))
+        sine, cosine = np.sin(theta), np.cos(theta)
+        up, aside = sine * np.cos(phi), sine * np.sin(phi)
+        wi = np.empty((*theta.shape, 3), np.float32)
+        for axis in range(3):
+            made = cosine * self.mirror[row, axis]
+            made += up * self.up[row, axis]
+            made += aside * self.aside[row, axis]
+            wi[..., axis] = made
+        return wi, sine * (end * (GRADE * np.exp(GRADE * s) / np.expm1(GRADE)))
 
     def place(self, row: int, wi: npt.ArrayLike) -> tuple[F64, F64]:
         """s and φ in 0…2π of directions wi (N, 3): what `directions` leads to."""
@@ -75,17 +79,18 @@ class MirrorFrame:
 
 
 def over_boxes(
-    integrand: Integrand, wo: npt.ArrayLike, row: npt.ArrayLike, low: F64, size: F64, tolerance: npt.ArrayLike
+    integrand: Integrand, wo: npt.ArrayLike, row: npt.ArrayLike, low: F64, size: F64, tolerance: Tolerance
 ) -> F64:
     """(B, K) ∫ f dω over the boxes low (B, 2), size (B, 2) in (s, φ) around the mirror of wo[row].
 
-    Boxes are halved both ways until that changes them by less than `tolerance`, a number or (B, K).
+    Boxes are halved both ways until that changes them by less than `tolerance`: a number, (B, K), or what
+    makes it of the first estimate (B, K).
     """
     frame = MirrorFrame.of(wo)
     box = np.arange(len(low))
     rows = np.asarray(row, np.int64)
     value = _integrate(integrand, frame, rows, low, size)
-    limit = np.broadcast_to(np.asarray(tolerance, np.float64), value.shape)
+    limit = np.broadcast_to(tolerance(value) if callable(tolerance) else tolerance, value.shape)
     total = np.zeros(value.shape)
     corner = np.array([[0, 0], [0, 1], [1, 0], [1, 1]])
     for _ in range(ROUNDS):
@@ -104,15 +109,25 @@ def over_boxes(
     return total
 
 
-def over_hemisphere(integrand: Integrand, wo: npt.ArrayLike, tolerance: npt.ArrayLike) -> F64:
-    """(R, K) ∫ f dω for the rows of wo (R, 3); `tolerance` (or (R, K)) is of one box of some dozens."""
+def over_hemisphere(
+    integrand: Integrand, wo: npt.ArrayLike, tolerance: float, floor: float | None = None
+) -> F64:
+    """(R, K) ∫ f dω for the rows of wo (R, 3); `tolerance` is of one box of some dozens.
+
+    With `floor` it is relative: to the row's integral, or to `floor` times the largest of all rows.
+    """
     directions = np.atleast_2d(np.asarray(wo, np.float64))
     low, size = grid(*FIRST)
     count, rows = len(low), len(directions)
     row = np.repeat(np.arange(rows), count)
-    limit = np.asarray(tolerance, np.float64)
-    limit = limit if limit.ndim == 0 else np.repeat(limit, count, axis=0)
-    boxes = over_boxes(integrand, directions, row, np.tile(low, (rows, 1)), np.tile(size, (rows, 1)), limit)
+
+    def relative(first: F64) -> F64:
+        whole = np.abs(first.reshape(rows, count, -1).sum(axis=1))
+        limit = tolerance * np.maximum(whole, (floor or 0.0) * whole.max(axis=0))
+        return np.asarray(np.repeat(limit, count, axis=0))
+
+    low, size = np.tile(low, (rows, 1)), np.tile(size, (rows, 1))
+    boxes = over_boxes(integrand, directions, row, low, size, tolerance if floor is None else relative)
     made: F64 = boxes.reshape(rows, count, -1).sum(axis=1)
     return made
 
@@ -131,12 +146,11 @@ _NODES, _WEIGHTS = (_NODES + 1) / 2, _WEIGHTS / 2
 def _integrate(
     integrand: Integrand, frame: MirrorFrame, row: npt.NDArray[np.int64], low: F64, size: F64
 ) -> F64:
-    s = (low[:, :1] + size[:, :1] * _NODES)[:, :, None] + np.zeros(POINTS)
-    phi = (low[:, 1:] + size[:, 1:] * _NODES)[:, None, :] + np.zeros((POINTS, 1))
-    where = np.broadcast_to(row[:, None, None], s.shape)
-    wi, measure = frame.directions(where, s, phi)
-    measure = measure * _WEIGHTS[:, None] * _WEIGHTS * (size[:, 0] * size[:, 1])[:, None, None]
-    columns = wi.reshape(len(row), -1, 3).astype(np.float32)
+    s = (low[:, :1] + size[:, :1] * _NODES)[:, :, None]
+    phi = (low[:, 1:] + size[:, 1:] * _NODES)[:, None, :]
+    wi, measure = frame.directions(row[:, None, None], s, phi)
+    measure *= _WEIGHTS[:, None] * _WEIGHTS * (size[:, 0] * size[:, 1])[:, None, None]
+    columns = wi.reshape(len(row), -1, 3)
     weight = measure.reshape(len(row), -1, 1)
     made: F64 | None = None
     for one in np.unique(row):

@@ -25,11 +25,18 @@ def test_shaping_parts_the_parameters() -> None:
     assert len(list(shapes(model_of("lambert"), (0.0, 0.5)))) == 1
 
 
-@pytest.mark.parametrize("exact", [True, False])
-def test_furnace_of_white_paint_is_one(exact: bool) -> None:
-    found = furnace(model_of("lambert"), [0, 1], np.radians([0, 60, 89]), exact)
-    np.testing.assert_allclose(found.high, np.ones((1, 3)), rtol=1e-3)
-    np.testing.assert_allclose(found.low, 0, atol=1e-9)
+def test_furnace_of_white_paint_is_one() -> None:
+    low, high = furnace(model_of("lambert"), [{"base_color": (0.5, 0.5, 0.5)}] * 2, np.radians([0, 60, 89]))
+    np.testing.assert_allclose(high, np.ones((2, 3)), rtol=1e-3)
+    np.testing.assert_allclose(low, 0, atol=1e-9)
+
+
+def test_furnace_finds_the_whitest_corner() -> None:
+    model = model_of("ggx")
+    rough = [{**defaults(model.Params), "roughness": 1.0}]
+    low, high = furnace(model, rough, [0.0], 0.3)
+    assert 0.9 < high[0, 0] <= 1.001
+    assert 0 <= low[0, 0] < 0.1
 
 
 def test_a_model_that_is_not_reciprocal_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
