@@ -28,7 +28,8 @@ import numpy.typing as npt
 from studio_core.brdfs.calls import evaluate as call
 from studio_core.contract import Brdf
 from studio_core.errors import InputError
-from studio_core.jit import batch_function
+from studio_core.jit import batch_function, kernel
+from studio_core.kernels.background import angle
 from studio_core.kernels.brdf import (
     DENSITY_SIGNATURE,
     HALF,
@@ -72,6 +73,16 @@ class Params:
     )
 
 
+@kernel
+def _scale(shape: Any, flat: np.float32, up: np.float32) -> np.float32:
+    """s of a direction by its sine and cosine."""
+    at = _TO_CURVE * angle(flat, max(up, ZERO))
+    first = min(int(at), CURVE - 2)
+    part = at - np.float32(first)
+    made: np.float32 = shape[REFERENCE + first] * (ONE - part) + shape[REFERENCE + first + 1] * part
+    return made
+
+
 @batch_function(SIGNATURE)
 def evaluate(shape: Any, wo: Any, count: int, wi: Any, out: Any) -> None:
     """See `studio_core.contract.Brdf`. shape: reference of the table, s at CURVE directions, half angles."""
@@ -83,57 +94,59 @@ def evaluate(shape: Any, wo: Any, count: int, wi: Any, out: Any) -> None:
     directions = carray(wi, 3 * count)
     x, y, z = directions[:count], directions[count : 2 * count], directions[2 * count :]
     terms = carray(out, 3 * count)
-    at = _TO_CURVE * np.arctan2(np.sqrt(ox * ox + oy * oy), oz)
-    first = min(max(int(at), 0), CURVE - 2)
-    part = at - np.float32(first)
-    seen = s[REFERENCE + first] * (ONE - part) + s[REFERENCE + first + 1] * part
+    red, green, blue = terms[:count], terms[count : 2 * count], terms[2 * count :]
+    # Vector code: cells of θ_h, θ_d and φ_d, counted from the first's middle, wait where results will be.
+    to_half, to_difference = _TO_HALF * np.float32(half), _TO_DIFFERENCE * np.float32(difference)
+    to_azimuth, most_a, most_b = (
+        _TO_AZIMUTH * np.float32(azimuth),
+        np.float32(half - 1),
+        np.float32(difference - 1),
+    )
     for k in range(count):
-        if not (oz > ZERO and z[k] > ZERO):
-            terms[k] = terms[count + k] = terms[2 * count + k] = ZERO
-            continue
-        at = _TO_CURVE * np.arctan2(np.sqrt(x[k] * x[k] + y[k] * y[k]), z[k])
-        first = min(max(int(at), 0), CURVE - 2)
-        part = at - np.float32(first)
-        scale = min(seen, s[REFERENCE + first] * (ONE - part) + s[REFERENCE + first + 1] * part)
-
         hx, hy, hz = x[k] + ox, y[k] + oy, z[k] + oz
         ex, ey, ez = x[k] - ox, y[k] - oy, z[k] - oz
         flat = hx * hx + hy * hy
         length = np.sqrt(flat + hz * hz)
-        across, along = hx * ey - hy * ex, -ez * length
-        if flat < _UPRIGHT:
-            across, along = ey, ex
-        turn = np.arctan2(across, along)
-        if turn < ZERO:
-            turn += _PI
-        # in cells, counted from the middle of the first
-        a = _TO_HALF * np.sqrt(np.arctan2(np.sqrt(flat), hz)) * np.float32(half) - HALF
-        b = _TO_DIFFERENCE * np.arctan2(np.sqrt(ex * ex + ey * ey + ez * ez), length)
-        b = b * np.float32(difference) - HALF
-        c = _TO_AZIMUTH * turn * np.float32(azimuth) - HALF
-        a = min(max(a, ZERO), np.float32(half - 1))
-        b = min(max(b, ZERO), np.float32(difference - 1))
-        c = max(c, -HALF)
-        i, j, low = int(a), int(b), int(np.floor(c))
+        upright = flat < _UPRIGHT
+        turn = angle(ey if upright else hx * ey - hy * ex, ex if upright else -ez * length)
+        turn = turn + _PI if turn < ZERO else turn
+        a = to_half * np.sqrt(angle(np.sqrt(flat), max(hz, ZERO))) - HALF
+        b = to_difference * angle(np.sqrt(ex * ex + ey * ey + ez * ez), length) - HALF
+        red[k] = min(max(a, ZERO), most_a)
+        green[k] = min(max(b, ZERO), most_b)
+        blue[k] = max(to_azimuth * turn - HALF, -HALF)
+    for k in range(count):
+        a, b, c = red[k], green[k], blue[k]
+        if not (oz > ZERO and z[k] > ZERO):
+            red[k] = green[k] = blue[k] = ZERO
+            continue
+        i, j, low = int(a), int(b), int(c + ONE) - 1
         u, v, w = a - np.float32(i), b - np.float32(j), c - np.float32(low)
-        i1, j1 = min(i + 1, half - 1), min(j + 1, difference - 1)
-        high = (low + 1) % azimuth
-        low = (low + azimuth) % azimuth
-        red = green = blue = ZERO
-        for corner in range(8):
-            row = i1 if corner & 4 else i
-            column = j1 if corner & 2 else j
-            depth = high if corner & 1 else low
-            weight = u if corner & 4 else ONE - u
-            weight *= v if corner & 2 else ONE - v
-            weight *= w if corner & 1 else ONE - w
-            place = ((row * difference + column) * azimuth + depth) * 3
-            red += weight * table[place]
-            green += weight * table[place + 1]
-            blue += weight * table[place + 2]
-        terms[k] = scale * red
-        terms[count + k] = scale * green
-        terms[2 * count + k] = scale * blue
+        low = low + azimuth if low < 0 else (low - azimuth if low >= azimuth else low)
+        high = low + 1 if low + 1 < azimuth else 0
+        below, next_row = j * azimuth, azimuth * difference if i + 1 < half else 0
+        beside = azimuth if j + 1 < difference else 0
+        first = i * difference * azimuth + below
+        red[k], green[k], blue[k] = ZERO, ZERO, ZERO
+        for corner in range(4):
+            row = first + (next_row if corner & 2 else 0) + (beside if corner & 1 else 0)
+            weight = (u if corner & 2 else ONE - u) * (v if corner & 1 else ONE - v)
+            left, right = weight * (ONE - w), weight * w
+            p, q = 3 * (row + low), 3 * (row + high)
+            red[k] += left * table[p] + right * table[q]
+            green[k] += left * table[p + 1] + right * table[q + 1]
+            blue[k] += left * table[p + 2] + right * table[q + 2]
+    least = ONE
+    for k in range(CURVE):
+        least = min(least, s[REFERENCE + k])
+    if least == ONE:
+        return  # no direction returns too much
+    seen = _scale(s, np.sqrt(ox * ox + oy * oy), oz)
+    for k in range(count):
+        scale = min(seen, _scale(s, np.sqrt(x[k] * x[k] + y[k] * y[k]), z[k]))
+        red[k] *= scale
+        green[k] *= scale
+        blue[k] *= scale
 
 
 @batch_function(SAMPLE_SIGNATURE)
@@ -212,7 +225,7 @@ class Measured:
     def shape_of(self, values: Mapping[str, Value], tables: Mapping[str, Table]) -> F32:
         """(145,): reference of the table, s at CURVE directions, how half angles are drawn."""
         table = tables[SLOT]
-        if table.values.shape[3] != 3 or table.values.min() < 0:
+        if table.values.shape[3] != 3 or (table.key not in self._angles and table.values.min() < 0):
             raise InputError("its measurement is no table of reflectances in red, green and blue")
         curve = np.ones(CURVE)
         if values["keep_energy"]:
