@@ -62,8 +62,13 @@ class Brdf(Protocol):
 
         void eval(const float* shape, const float* wo, int64 count, const float* wi, float* out)
 
-    in the shading frame (z = normal): wo is (x, y, z); wi is x[count], y[count], z[count]; out is
-    term 0 [count], term 1 [count], … without the cosine. Directions with z ≤ 0 give 0. Finite always.
+    in the shading frame (z = normal, x along the texture coordinates' u, see `studio_core.scene.tangents`):
+    wo is (x, y, z); wi is x[count], y[count], z[count]; out is term 0 [count], term 1 [count], … without the
+    cosine. Directions with z ≤ 0 give 0. Finite always.
+
+    `textures` are parameters of the coefficients that may have a picture. A model may also have
+    `shape_textures: tuple[str, ...]`, numbers of the shape that may: every vertex then has a shape of its
+    own. Coefficients must not depend on these unless they are among `textures` too.
     """
 
     id: str

@@ -24,6 +24,7 @@ class Bound:
         self.inner, self.tables = inner, frozen_map(tables)
         self.id, self.label, self.Params = inner.id, inner.label, inner.Params
         self.terms, self.textures = inner.terms, inner.textures
+        self.shape_textures: tuple[str, ...] = tuple(getattr(inner, "shape_textures", ()))
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Bound) and (self.inner, *self._held) == (other.inner, *other._held)

@@ -39,7 +39,7 @@ class ChosenPoints:
     """Points that light is summed at: what a `WorldMesh` says of its vertices, for points of our own.
 
     Positions (P, 3) are relative to `origin`; normals and geometric (P, 3) unit; tangents (P, 4);
-    inset (P, 3) moves the start of rays; material (P,) is a row of `Shapes`.
+    inset (P, 3) moves the start of rays; material (P,) counts in `Surfaces.materials`.
     """
 
     origin: npt.NDArray[np.float64]
@@ -101,9 +101,11 @@ class Casters:
 
 @dataclass(frozen=True)
 class Shapes:
-    """BRDF kernels per material: address, number of terms, and where its shape starts in `data`.
+    """BRDF kernels by row: address, number of terms, and where the shape starts in `data`.
 
-    `tables` are those that shapes name, kept alive.
+    Row m is that of material m as a whole. Where a picture changes the shape over a surface, further rows
+    follow, and `row` (V,) names that of each vertex; `owner` (R,) is the material of each row. `tables` are
+    those that shapes name, kept alive.
     """
 
     address: npt.NDArray[np.int64]
@@ -112,6 +114,22 @@ class Shapes:
     data: F32
     problems: tuple[str, ...] = ()
     tables: tuple[Table, ...] = ()
+    owner: npt.NDArray[np.int64] | None = None
+    row: npt.NDArray[np.int32] | None = None
+
+    def rows(self, points: ShadingPoints) -> npt.NDArray[np.int32]:
+        """(V,) the row of each of the points that this was made for; -1: no material."""
+        return points.material if self.row is None else self.row
+
+    def of_points(self, some: npt.NDArray[np.int64]) -> Shapes:
+        """For some of the points alone."""
+        return self if self.row is None else dataclasses.replace(self, row=self.row[some])
+
+    def of_rows(self, by_material: F32) -> F32:
+        """What is known of M materials, and last of none (M + 1, …), for each row, and none, (R + 1, …)."""
+        if self.owner is None:
+            return by_material
+        return np.asarray(by_material[np.append(self.owner, len(by_material) - 1)])
 
     @property
     def width(self) -> int:

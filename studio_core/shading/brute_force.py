@@ -166,7 +166,7 @@ def environment_layer(
     layer = blank_layer(mesh, shapes)
     if not len(points):
         return layer
-    local_eye = (eye - mesh.origin).astype(np.float32)
+    local_eye, rows = (eye - mesh.origin).astype(np.float32), shapes.rows(mesh)
     for beam in beams(lighting, level, quarters):
         directions = beam.directions
         step = max(POINTS, BLOCK_BYTES * 8 // max(directions.size, 1))
@@ -188,7 +188,7 @@ def environment_layer(
                     mesh.positions,
                     mesh.normals,
                     mesh.tangents,
-                    mesh.material,
+                    rows,
                     local_eye,
                     bits,
                     beam.directions.directions,
@@ -220,7 +220,7 @@ def lamp_layer(
     """One lamp's layer at unit gain for `points`, by traced shadow rays to `samples` places of the lamp."""
     layer = blank_layer(mesh, shapes)
     targets = lamp_targets(lamp, min(samples, BATCH))
-    local_eye = (eye - mesh.origin).astype(np.float32)
+    local_eye, rows = (eye - mesh.origin).astype(np.float32), shapes.rows(mesh)
     step = max(1, (1 << 20) // len(targets))
     for first in range(0, len(points), step):
         job.checkpoint(first, len(points))
@@ -253,7 +253,7 @@ def lamp_layer(
                 mesh.positions,
                 mesh.normals,
                 mesh.tangents,
-                mesh.material,
+                rows,
                 local_eye,
                 towards,
                 weight,

@@ -8,6 +8,7 @@ the *vertices* (at random shown vertices: what the backend does alone).
 from __future__ import annotations
 
 import dataclasses
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -34,6 +35,7 @@ from studio_core.shading.brute_force import VisibilityBits, all_points, environm
 from studio_core.shading.frame import Frame
 from studio_core.shading.job import Job
 from studio_core.shading.pipeline import Pipeline
+from studio_core.shading.varying import ShapeTable
 
 F32 = npt.NDArray[np.float32]
 F64 = npt.NDArray[np.float64]
@@ -67,6 +69,7 @@ class ErrorMeter:
         self._workers = services.workers
         self._places = places  # where none are asked for
         self._coefficients = CoefficientTable(services.registry)
+        self._shapes = ShapeTable(services.registry)
         self._compositor = Compositor(services.workers)
 
     def __call__(
@@ -97,7 +100,9 @@ class ErrorMeter:
         table = self._coefficients(frame.scene, surfaces)
         seen = _some(hits, chosen)
         points = surface_points(surfaces, seen, frame)
-        truth = self._brute(points, shapes, lighting, casters, frame, job)
+        uvs = surface_uvs(surfaces, seen, frame)
+        there = self._shapes.at(frame.scene, surfaces.materials, points.material, uvs)
+        truth = self._brute(points, there, lighting, casters, frame, job)
         looks, lights = self._compositor.coefficients(surfaces, seen, table), _lights(frame)
         caught, photograph = self._compositor.photograph(frame.scene, surfaces, seen, chosen)
         before = self._compositor.photographed_light(frame.scene, points.normals[caught])
@@ -141,7 +146,7 @@ class ErrorMeter:
             mesh.inset[some],
             mesh.material[some],
         )
-        truth = self._brute(points, shapes, lighting, casters, frame, job)
+        truth = self._brute(points, shapes.of_points(some), lighting, casters, frame, job)
         lights = _lights(frame)
         looks = table.typical[mesh.material[some]].reshape(-1, table.width, 3)
         shown = (radiance.combined(lights)[some] * looks).sum(axis=1)
@@ -176,16 +181,8 @@ class ErrorMeter:
 def surface_points(surfaces: Surfaces, hits: Hits, frame: Frame) -> ChosenPoints:
     """The true surface points of hits, with interpolated normals."""
     mesh = surfaces.mesh
-    corners = mesh.faces[hits.face]
+    corners, weights, face_normal = _corners(surfaces, hits, frame)
     place = mesh.positions[corners].astype(np.float64)
-    face_normal = np.cross(place[:, 1] - place[:, 0], place[:, 2] - place[:, 0])
-    eye = np.asarray(frame.view.transform.translation, np.float64) - mesh.origin
-    behind = ((eye - place[:, 0]) * face_normal).sum(axis=1) < 0
-    back = mesh.back_faces[hits.face]
-    turned = behind & (back[:, 0] != NO_BACK)
-    corners = np.where(turned[:, None], back, corners)
-    face_normal = np.where(turned[:, None], -face_normal, face_normal)
-    weights = np.stack([1 - hits.u - hits.v, hits.u, hits.v], axis=1).astype(np.float64)
     normals = _unit(np.einsum("nk,nkc->nc", weights, mesh.normals[corners].astype(np.float64)))
     return ChosenPoints(
         mesh.origin,
@@ -196,6 +193,29 @@ def surface_points(surfaces: Surfaces, hits: Hits, frame: Frame) -> ChosenPoints
         np.zeros((len(corners), 3), np.float32),
         mesh.material[corners[:, 0]],
     )
+
+
+def surface_uvs(surfaces: Surfaces, hits: Hits, frame: Frame) -> F32:
+    """(P, 2) texture coordinates of hits."""
+    corners, weights, _ = _corners(surfaces, hits, frame)
+    at: F64 = np.einsum("nk,nkc->nc", weights, surfaces.mesh.uvs[corners].astype(np.float64))
+    return at.astype(np.float32)
+
+
+def _corners(surfaces: Surfaces, hits: Hits, frame: Frame) -> tuple[npt.NDArray[np.integer[Any]], F64, F64]:
+    """Vertices (P, 3) of the side that is seen, their weights (P, 3), and normals (P, 3) of the faces."""
+    mesh = surfaces.mesh
+    corners = mesh.faces[hits.face]
+    place = mesh.positions[corners].astype(np.float64)
+    face_normal = np.cross(place[:, 1] - place[:, 0], place[:, 2] - place[:, 0])
+    eye = np.asarray(frame.view.transform.translation, np.float64) - mesh.origin
+    behind = ((eye - place[:, 0]) * face_normal).sum(axis=1) < 0
+    back = mesh.back_faces[hits.face]
+    turned = behind & (back[:, 0] != NO_BACK)
+    corners = np.where(turned[:, None], back, corners)
+    face_normal = np.where(turned[:, None], -face_normal, face_normal)
+    weights = np.stack([1 - hits.u - hits.v, hits.u, hits.v], axis=1).astype(np.float64)
+    return corners, weights, face_normal
 
 
 def _unit(vectors: F64) -> F32:

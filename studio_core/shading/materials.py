@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any, cast
 
 import numpy as np
@@ -24,7 +24,9 @@ FALLBACK = "lambert"
 class Resolved:
     """A material with its model and all parameter values; `problem` says what had to be replaced.
 
-    `tables` are those that the model reads; whoever keeps a shape of it keeps them alive.
+    Textures multiply `values`: `textures` in each pixel those that colours are made of, `shaping` at each
+    vertex those that the shape is made of. `tables` are those that the model reads; whoever keeps a shape of
+    it keeps them alive.
     """
 
     brdf: Brdf
@@ -32,6 +34,18 @@ class Resolved:
     textures: Mapping[str, Texture]
     problem: str = ""
     tables: tuple[Table, ...] = ()
+    shaping: Mapping[str, Texture] = field(default_factory=dict)
+
+    def scaled(self, texels: Iterable[float]) -> Mapping[str, Value]:
+        """The values where the pictures of `shaping`, in their order, have these texels."""
+        made = {**self.values}
+        for name, texel in zip(self.shaping, texels, strict=True):
+            made[name] = _number(made[name]) * texel
+        return made
+
+    def typical(self, mean: Callable[[Image], float] | None = None) -> Mapping[str, Value]:
+        """The values with the means of the pictures of `shaping`, found by `mean` (else `mean_texel`)."""
+        return self.scaled((mean or mean_texel)(texture.image) for texture in self.shaping.values())
 
 
 def resolve(material: Material, registry: Registry) -> Resolved:
@@ -53,7 +67,10 @@ def resolve(material: Material, registry: Registry) -> Resolved:
             except InputError as error:
                 problem = f"{material.name}: {error}"
     textures: dict[str, Texture] = {}
+    shaping: dict[str, Texture] = {}
     for name, texture in material.textures.items():
+        if name in shape_textures(brdf):
+            shaping[name] = texture
         if name not in brdf.textures:
             continue
         first = next(iter(textures.values()), texture)
@@ -64,10 +81,10 @@ def resolve(material: Material, registry: Registry) -> Resolved:
             values[name] = _times(values[name], mean)
             problem = f"{material.name}: the textures of one material lie alike; {name} is shown as its mean"
     if not getattr(brdf, "tables", ()):
-        return Resolved(brdf, values, textures, problem)
+        return Resolved(brdf, values, textures, problem, (), shaping)
     try:
         made = _with_tables(brdf, material, values)
-        return Resolved(made, values, textures, problem, tuple(made.tables.values()))
+        return Resolved(made, values, textures, problem, tuple(made.tables.values()), shaping)
     except LucarneError as error:
         problem = f"{material.name}: {error}; shown as matte grey"
         brdf = registry.brdf(FALLBACK)
@@ -85,6 +102,27 @@ def _with_tables(brdf: Brdf, material: Material, values: Mapping[str, Value]) ->
     return made
 
 
+def shape_textures(brdf: Brdf) -> tuple[str, ...]:
+    """Parameters of the model's shape that may have a picture; see `studio_core.contract.Brdf`."""
+    return tuple(getattr(brdf, "shape_textures", ()))
+
+
+def first_channel(image: Image) -> npt.NDArray[np.float32]:
+    """(H, W) what a picture multiplies numbers with, linear."""
+    return linear(Image(image.pixels[:, :, :1], image.encoding))[..., 0]
+
+
+def mean_texel(image: Image) -> float:
+    """Mean of a picture that multiplies a number."""
+    return float(first_channel(image).mean(dtype=np.float64))
+
+
+def _number(value: Value) -> float:
+    if isinstance(value, tuple | str):
+        raise PluginError("only numbers of a shape may have pictures")
+    return float(value)
+
+
 def _times(value: Value, colour: npt.NDArray[np.float64]) -> Value:
     """A colour, or a number (by the first channel, as texels are read)."""
     if isinstance(value, tuple):
@@ -93,17 +131,20 @@ def _times(value: Value, colour: npt.NDArray[np.float64]) -> Value:
     return float(value) * float(colour[0])
 
 
-def shapes(scene: Scene, materials: Sequence[MaterialId], registry: Registry) -> Shapes:
-    """The table of BRDF kernels for `materials`."""
+def shapes(
+    scene: Scene,
+    materials: Sequence[MaterialId],
+    registry: Registry,
+    mean: Callable[[Image], float] | None = None,
+) -> Shapes:
+    """The table of BRDF kernels for `materials`; see `Resolved.typical` for `mean`."""
     address, terms, offset, problems = [], [], [], []
     data: list[npt.NDArray[np.float32]] = []
     tables: list[Table] = []
     length = 0
     for material in materials:
         resolved = resolve(scene.material(material), registry)
-        shape = np.atleast_1d(np.asarray(resolved.brdf.shape(resolved.values), np.float32))
-        if not np.isfinite(shape).all():
-            raise PluginError(f"model {resolved.brdf.id!r} gave a shape that is not finite")
+        shape = finite_shape(resolved.brdf, resolved.typical(mean))
         address.append(resolved.brdf.address)
         terms.append(resolved.brdf.terms)
         offset.append(length)
@@ -117,10 +158,20 @@ def shapes(scene: Scene, materials: Sequence[MaterialId], registry: Registry) ->
     return Shapes(*made, flat, tuple(problems), tuple(tables))
 
 
+def finite_shape(brdf: Brdf, values: Mapping[str, Value]) -> npt.NDArray[np.float32]:
+    """What the model's kernel reads; PluginError when it is not finite."""
+    made = np.atleast_1d(np.asarray(brdf.shape(values), np.float32))
+    if not np.isfinite(made).all():
+        raise PluginError(f"model {brdf.id!r} gave a shape that is not finite")
+    return made
+
+
 def same_shapes(a: Shapes, b: Shapes) -> bool:
     """Whether the kernels would compute the same."""
     pairs = ((a.address, b.address), (a.terms, b.terms), (a.offset, b.offset), (a.data, b.data))
-    return all(np.array_equal(x, y) for x, y in pairs)
+    if (a.row is None) != (b.row is None) or not all(np.array_equal(x, y) for x, y in pairs):
+        return False
+    return a.row is None or b.row is None or a.row is b.row or np.array_equal(a.row, b.row)
 
 
 def coefficients(resolved: Resolved, width: int = 0) -> npt.NDArray[np.float32]:
@@ -188,4 +239,17 @@ def linear_rgb(image: Image) -> npt.NDArray[np.float32]:
     return np.ascontiguousarray(np.broadcast_to(pixels, (*pixels.shape[:2], 3)))
 
 
-__all__ = ["Resolved", "coefficients", "linear", "linear_rgb", "padded", "resolve", "same_shapes", "shapes"]
+__all__ = [
+    "Resolved",
+    "coefficients",
+    "finite_shape",
+    "first_channel",
+    "linear",
+    "linear_rgb",
+    "mean_texel",
+    "padded",
+    "resolve",
+    "same_shapes",
+    "shape_textures",
+    "shapes",
+]

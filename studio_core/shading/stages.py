@@ -11,10 +11,11 @@ from studio_core.shading.artifacts import Shapes, Surfaces
 from studio_core.shading.frame import Frame
 from studio_core.shading.job import Job
 from studio_core.shading.lighting import LightingStage
-from studio_core.shading.materials import same_shapes, shapes
+from studio_core.shading.materials import same_shapes
 from studio_core.shading.pipeline import Inputs
 from studio_core.shading.refinement import Adaptive, AdaptiveSurfaceStage, LocatedPrimaryStage
 from studio_core.shading.surfaces import BODIES, CasterStage, SurfaceParams, SurfaceStage
+from studio_core.shading.varying import ShapeTable
 
 
 class ShapeStage:
@@ -25,11 +26,12 @@ class ShapeStage:
     dirtied_by = Aspect.MATERIAL | BODIES
 
     def __init__(self, services: Services) -> None:
-        self._registry = services.registry
+        self._table = ShapeTable(services.registry)
 
     def run(self, frame: Frame, inputs: Inputs, job: Job) -> Shapes:
-        """The table for the materials of `Surfaces`."""
-        made = shapes(frame.scene, inputs[Surfaces].materials, self._registry)
+        """The table for the materials and vertices of `Surfaces`."""
+        surfaces = inputs[Surfaces]
+        made = self._table(frame.scene, surfaces.materials, surfaces.mesh)
         previous: Shapes | None = inputs.previous
         if previous is not None and same_shapes(previous, made) and previous.problems == made.problems:
             return previous

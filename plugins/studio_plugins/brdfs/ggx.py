@@ -122,6 +122,7 @@ class Ggx:
     Params = Params
     terms = 3
     textures: tuple[str, ...] = ("base_color", "metallic", "specular")
+    shape_textures: tuple[str, ...] = ("roughness",)
 
     @property
     def address(self) -> int:

@@ -72,13 +72,14 @@ class FocusStage:
         mesh = inputs[Surfaces].mesh
         base, prefix = arriving.environment, arriving.prefix
         if base is not None and prefix is not None:
-            lobes = self._lobes(inputs[Shapes])
+            shapes = inputs[Shapes]
+            lobes = self._lobes(shapes)
             slopes = [lobe.slope if lobe.slope < BROADEST else 0.0 for lobe in lobes]
             alpha = np.array([*slopes, 0.0], np.float32)
             wanted = quality(frame.params.quality).lobe
             eye = (np.asarray(frame.view.transform.translation, np.float64) - mesh.origin).astype(np.float32)
             self._follow(seen, prefix, mesh.positions)
-            mine = alpha[mesh.material]
+            mine = alpha[shapes.rows(mesh)]
             asked = seen.summed & (mine > 0)
             stale = (self._version != base.version) | (mine < SHARPER * self._alpha)
             if not frame.moving:
@@ -90,7 +91,7 @@ class FocusStage:
             self._version[mine <= 0] = -1  # what gets sharp again is split again
             self._table.drop(self._version != base.version)
             if stale.any():
-                weights = self._weights(frame.scene, inputs[Surfaces].materials)
+                weights = shapes.of_rows(self._weights(frame.scene, inputs[Surfaces].materials))
                 tolerance = MOVING * wanted if frame.moving else wanted
                 ahead = np.float32(AHEAD if frame.moving else 1)  # a slider goes on the way it goes
                 self._split(base, prefix, inputs, stale, eye, ahead * alpha, weights, tolerance, job)
@@ -163,7 +164,7 @@ class FocusStage:
                     mesh.positions,
                     mesh.normals,
                     mesh.tangents,
-                    mesh.material,
+                    shapes.rows(mesh),
                     eye,
                     shapes.address,
                     shapes.terms,

@@ -85,9 +85,9 @@ class LightStage:
         surfaces, lighting, seen = inputs[Surfaces], inputs[Lighting], inputs[Seen]
         mesh = surfaces.mesh
         wanted = quality(frame.params.quality)
-        lobes = self._lobes(inputs[Shapes])
-        by_material = np.array([not lobe.flat for lobe in lobes] + [False], np.bool_)
-        glossy = by_material[mesh.material]
+        shapes = inputs[Shapes]
+        by_row = np.array([not lobe.flat for lobe in self._lobes(shapes)] + [False], np.bool_)
+        glossy = by_row[shapes.rows(mesh)]
         summed = looked = 0
         if lighting.environment is not None and lighting.tree is not None:
             tree = self._fitted(lighting.tree, seen.store.k)

@@ -36,13 +36,13 @@ class Lobe:
 
 
 class LobeTable:
-    """Lobes of materials, kept by kernel and shape."""
+    """Lobes of rows of shapes, kept by kernel and shape."""
 
     def __init__(self) -> None:
         self._kept: dict[tuple[int, int, bytes], Lobe] = {}
 
     def __call__(self, shapes: Shapes) -> list[Lobe]:
-        """One a material."""
+        """One a row."""
         bounds = np.append(shapes.offset, len(shapes.data))
         made = []
         for m in range(len(shapes.address)):

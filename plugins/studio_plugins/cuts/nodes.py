@@ -175,7 +175,7 @@ class NodeTable:
         The eye is relative to the mesh's origin.
         """
         numbered = self.numbered()
-        looked = np.zeros(len(numbered), np.int64)
+        looked, rows = np.zeros(len(numbered), np.int64), shapes.rows(mesh)
 
         def body(begin: int, stop: int) -> None:
             for index in range(begin, stop):
@@ -191,7 +191,7 @@ class NodeTable:
                     mesh.positions,
                     mesh.normals,
                     mesh.tangents,
-                    mesh.material,
+                    rows,
                     eye,
                     shapes.address,
                     shapes.terms,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -10,7 +11,7 @@ import numpy.typing as npt
 from studio_core.contract import Services
 from studio_core.scene.diff import Aspect
 from studio_core.scene.nodes import NodeId
-from studio_core.shading.artifacts import Hits, LayerRadiance, Radiance, Shapes, Surfaces
+from studio_core.shading.artifacts import Hits, LayerRadiance, Radiance, ShadingPoints, Shapes, Surfaces
 from studio_core.shading.frame import Frame
 from studio_core.shading.job import Job
 from studio_core.shading.pipeline import Inputs
@@ -44,7 +45,9 @@ class RadianceStage:
         self._workers = services.workers
         self._layers: dict[NodeId, _Layer] = {}
         self._eye: tuple[float, ...] = ()
-        self._shapes: list[tuple[int, bytes]] = []
+        self._kernels: dict[tuple[int, bytes], int] = {}
+        self._numbering = itertools.count(1)
+        self._kernel: I64 = np.zeros(0, np.int64)
         self._material: npt.NDArray[np.int32] = np.zeros(0, np.int32)
         self._positions: F32 = np.zeros((0, 3), np.float32)
         self._numbers: tuple[object, ...] = ()
@@ -58,11 +61,10 @@ class RadianceStage:
         local_eye = (np.asarray(eye, np.float64) - mesh.origin).astype(np.float32)
         numbers = (seen.store, seen.store.generation)
         moved = eye != self._eye or numbers != self._numbers
-        shape_table = _shape_table(shapes)
-        changed = _changed_materials(self._shapes, shape_table)
-        other = np.append(changed, True)[mesh.material]
+        kernel = self._kernel_of(shapes, mesh)
+        other = np.ones(count, np.bool_)
         if numbers == self._numbers:  # who moves sees the eye elsewhere
-            other |= self._material != mesh.material
+            other = (self._kernel != kernel) | (self._material != mesh.material)
             if self._positions is not mesh.positions:
                 other |= (self._positions != mesh.positions).any(axis=1)
         summed = seen.summed
@@ -114,7 +116,7 @@ class RadianceStage:
                 done = [np.where(rest, -1, version) for version in done]
             layers[node] = LayerRadiance(terms, irradiance)
             kept[node] = _Layer(layers[node], done)
-        self._layers, self._eye, self._shapes, self._material = kept, eye, shape_table, mesh.material
+        self._layers, self._eye, self._kernel, self._material = kept, eye, kernel, mesh.material
         self._positions, self._numbers = mesh.positions, numbers
         counts = {
             **seen.store.summary(),
@@ -128,6 +130,17 @@ class RadianceStage:
         }
         return Radiance(surfaces, inputs[Hits], layers, seen.mask, 1 << seen.level, seen.exact, counts)
 
+    def _kernel_of(self, shapes: Shapes, mesh: ShadingPoints) -> I64:
+        """(V,) a number for each vertex' kernel and shape: the same while they are; 0 without a material."""
+        bounds = np.append(shapes.offset, len(shapes.data))
+        rows = [
+            (int(address), shapes.data[begin:end].tobytes())
+            for address, begin, end in zip(shapes.address, bounds[:-1], bounds[1:], strict=True)
+        ]
+        known = self._kernels
+        self._kernels = {row: known[row] if row in known else next(self._numbering) for row in set(rows)}
+        return np.array([*(self._kernels[row] for row in rows), 0], np.int64)[shapes.rows(mesh)]
+
 
 def _irradiance(pairs: tuple[tuple[NodeTable, NodeTable | None], ...], rows: I64) -> F32:
     made = np.zeros((len(rows), 3), np.float32)
@@ -140,15 +153,3 @@ def _or_blank(before: _Layer | None, versions: list[I64], moved: bool) -> list[I
     if before is None or moved or len(before.version) != len(versions):
         return [np.full_like(version, -1) for version in versions]
     return before.version
-
-
-def _shape_table(shapes: Shapes) -> list[tuple[int, bytes]]:
-    bounds = np.append(shapes.offset, len(shapes.data))
-    return [
-        (int(shapes.address[m]), shapes.data[bounds[m] : bounds[m + 1]].tobytes())
-        for m in range(len(shapes.address))
-    ]
-
-
-def _changed_materials(before: list[tuple[int, bytes]], now: list[tuple[int, bytes]]) -> Bools:
-    return np.array([m >= len(before) or before[m] != shape for m, shape in enumerate(now)], np.bool_)

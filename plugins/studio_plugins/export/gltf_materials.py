@@ -10,7 +10,8 @@ blinn-phong    become F0 of a dielectric (KHR_materials_specular), or a metal wh
 any other      dielectric of roughness 1 in its mean colour, with a note
 =============  =====================================================================================
 
-All are double-sided; opacity below 1 is blended. Texture scale and offset become KHR_texture_transform.
+Pictures of roughness and metal become the green and blue of one. All are double-sided; opacity below 1 is
+blended. Texture scale and offset become KHR_texture_transform.
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ from studio_core.imaging.encode import encode_png
 from studio_core.imaging.transfer import linear_to_srgb
 from studio_core.scene.geometry import Image, Texture
 from studio_core.scene.nodes import Material, MaterialId, Scene
-from studio_core.shading.materials import Resolved, linear, resolve
+from studio_core.shading.materials import Resolved, first_channel, linear, resolve
 from studio_plugins.export.gltf_buffer import Buffer
 
 NO_MATTE = 0.02  # albedo under which a Phong material counts as metal
@@ -99,8 +100,14 @@ class Materials:
         base = self._base(resolved, "base_color", float(values["metallic"]), float(values["roughness"]))
         made["pbrMetallicRoughness"] = base
         specular = float(values["specular"])
-        if "metallic" in resolved.textures:
-            base["metallicRoughnessTexture"] = self._metallic(resolved.textures["metallic"])
+        metal, rough = resolved.textures.get("metallic"), resolved.shaping.get("roughness")
+        if metal is not None and rough is not None and not _alike(metal, rough):
+            told = "glTF lays metal and roughness alike; the picture of the roughness became its mean."
+            self.notes.append(f"{material.name}: {told}")
+            typical: Any = resolved.typical()
+            base["roughnessFactor"], rough = float(typical["roughness"]), None
+        if metal is not None or rough is not None:
+            base["metallicRoughnessTexture"] = self._shares(metal, rough)
         if "specular" in resolved.textures:
             specular *= float(linear(resolved.textures["specular"].image)[..., 0].mean())
             self.notes.append(f"{material.name}: glTF takes one reflectance; its texture's mean was written.")
@@ -130,11 +137,18 @@ class Materials:
     def _colour(self, texture: Texture) -> Json:
         return self._texture(texture, "colour", _encoded(texture.image))
 
-    def _metallic(self, texture: Texture) -> Json:
-        metal = np.clip(linear(texture.image)[..., 0], 0, 1)
-        pixels = np.full((*metal.shape, 3), 255, np.uint8)
-        pixels[..., 2] = np.rint(metal * 255)  # blue; green is roughness
-        return self._texture(texture, "metallic", pixels)
+    def _shares(self, metal: Texture | None, rough: Texture | None) -> Json:
+        """A picture with roughness in green and metal in blue; what is none is white."""
+        given = [texture for texture in (rough, metal) if texture is not None]
+        size = tuple(max(t.image.pixels.shape[axis] for t in given) for axis in (0, 1))
+        pixels = np.full((*size, 3), 255, np.uint8)
+        for channel, texture in ((1, rough), (2, metal)):
+            if texture is not None:
+                pixels[..., channel] = np.rint(
+                    np.clip(_sized(first_channel(texture.image), size), 0, 1) * 255
+                )
+        use = " ".join("" if t is None else t.image.key for t in (rough, metal))
+        return self._texture(given[0], f"shares {use}", pixels)
 
     def _texture(self, texture: Texture, use: str, pixels: npt.NDArray[np.uint8]) -> Json:
         key = (texture.image.key, use)
@@ -150,6 +164,16 @@ class Materials:
             made["extensions"] = {"KHR_texture_transform": moved}
             self.extensions.add("KHR_texture_transform")
         return made
+
+
+def _alike(a: Texture, b: Texture) -> bool:
+    return (a.scale, a.offset) == (b.scale, b.offset)
+
+
+def _sized(texels: npt.NDArray[np.float32], size: tuple[int, ...]) -> npt.NDArray[np.float32]:
+    """The nearest texels at another size."""
+    rows, columns = (np.arange(n) * had // n for n, had in zip(size, texels.shape, strict=True))
+    return np.asarray(texels[rows][:, columns])
 
 
 def _unit(value: Any) -> list[float]:

@@ -84,7 +84,9 @@ class Materials:
         resolved = resolve(material, self.registry)
         if resolved.problem:
             self.notes.append(resolved.problem)
-        model, values = resolved.brdf.id, resolved.values
+        model, values = resolved.brdf.id, resolved.typical()
+        for name in resolved.shaping:
+            self.notes.append(f"{material.name}: its picture of {name} was written as its mean.")
         if model == "lambert":
             made = put(self.root, "bsdf", "diffuse", key=key)
             self._parameter(made, "reflectance", resolved, "base_color")

@@ -1,4 +1,8 @@
-"""Materials of glTF 2.0 as ours: metallic-roughness is GGX; glass is seen through by its transmission."""
+"""Materials of glTF 2.0 as ours: metallic-roughness is GGX; glass is seen through by its transmission.
+
+The green channel of a metallic-roughness picture becomes a picture of the roughness, the blue one of the
+metal; a channel that is the same all over becomes its mean.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +16,9 @@ from studio_core.scene.geometry import Image, Texture
 from studio_core.scene.nodes import Material, new_id
 from studio_plugins.meshes.common import PLAIN_GREY, Notes, colour
 from studio_plugins.meshes.gltf_file import GltfFile, Json, as_index
-from studio_plugins.meshes.pictures import Pictures, mean_of, opaque
+from studio_plugins.meshes.pictures import Pictures, channel_of, mean_of, opaque
+
+MOST_TEXELS = 1 << 22  # of pictures of colour and metal together: a table of coefficients takes 48 bytes each
 
 
 class GltfMaterials:
@@ -56,18 +62,20 @@ class GltfMaterials:
             metallic = self.file.floats(pbr, "metallicFactor", (1.0,))[0]
             roughness = self.file.floats(pbr, "roughnessFactor", (1.0,))[0]
             key = "baseColorTexture"
-        both = self._image(pbr.get("metallicRoughnessTexture"))
-        if both is not None:
-            self.notes.say(f"The mean of the metallic-roughness picture is used for all of {name!r}.")
-            metallic *= mean_of(both, 2)
-            roughness *= mean_of(both, 1)
         reference = pbr.get(key)
         image = self._image(reference)
-        textures = {}
-        uv_set = 0
+        textures: dict[str, Texture] = {}
+        uv_set: int | None = None
         if image is not None and isinstance(reference, dict):
             scale, offset, uv_set = self._placing(reference)
             textures["base_color"] = Texture(opaque(image), scale, offset)
+        second = pbr.get("metallicRoughnessTexture")
+        both = self._image(second)
+        if both is not None and isinstance(second, dict):
+            placing = self._placing(second)
+            means = self._vary(both, placing, uv_set, textures, name)
+            metallic, roughness = metallic * means[0], roughness * means[1]
+            uv_set = placing[2] if uv_set is None else uv_set
         for unused, word in (
             ("normalTexture", "normal"),
             ("occlusionTexture", "occlusion"),
@@ -91,7 +99,35 @@ class GltfMaterials:
             textures=textures,
             opacity=self._opacity(source, extensions, factor[3], image, name),
         )
-        return material, uv_set
+        return material, uv_set or 0
+
+    def _vary(
+        self,
+        both: Image,
+        placing: tuple[tuple[float, float], tuple[float, float], int],
+        uv_set: int | None,
+        textures: dict[str, Texture],
+        name: str,
+    ) -> tuple[float, float]:
+        """Adds pictures of metal and roughness; the factors that stand for what is none (1: it is one)."""
+        scale, offset, own_set = placing
+        if uv_set is not None and own_set != uv_set:
+            self.notes.say(f"The mean of the metallic-roughness picture is used for all of {name!r}.")
+            return mean_of(both, 2), mean_of(both, 1)
+        metal, rough = channel_of(both, 2), channel_of(both, 1)
+        base = textures.get("base_color")
+        if metal is not None and base is not None:
+            alike = (base.scale, base.offset) == (scale, offset)
+            large = max(base.image.pixels[..., 0].size, metal.pixels.size) > MOST_TEXELS
+            if large or not alike:
+                why = "is too large" if large else "lies otherwise than its colour"
+                self.notes.say(f"The picture of the metal of {name!r} {why}: its mean is used.")
+                metal = None
+        if metal is not None:
+            textures["metallic"] = Texture(metal, scale, offset)
+        if rough is not None:
+            textures["roughness"] = Texture(rough, scale, offset)
+        return 1.0 if metal is not None else mean_of(both, 2), 1.0 if rough is not None else mean_of(both, 1)
 
     def _specular(self, extensions: Json) -> float:
         """Ours is F0 / 0.08; from the index of refraction (1.5 gives 0.5) and the specular factor."""

@@ -15,7 +15,7 @@ from studio_core.params import Value
 from studio_core.scene.geometry import Texture
 from studio_core.scene.nodes import Material, new_id
 from studio_plugins.meshes.common import PLAIN_GREY, Notes, colour, share
-from studio_plugins.meshes.pictures import Pictures, mean_of, opaque
+from studio_plugins.meshes.pictures import Pictures, channel_of, mean_of, opaque
 
 _UNUSED = {
     "map_bump": "bump",
@@ -146,14 +146,14 @@ def material_of(entry: Entry, pictures: Pictures, notes: Notes) -> Material:
     shine = colour(entry.colour("ks", 0.0))
     values: dict[str, Value]
     target = "base_color"
+    shaped: dict[str, Texture] = {}
     if any(key in entry.numbers for key in ("pr", "pm")) or {"map_pr", "map_pm"} & entry.maps.keys():
         model = "ggx"
-        metallic = _mean(entry, "pm", 0.0, pictures, notes)
-        values = {
-            "base_color": base,
-            "metallic": metallic,
-            "roughness": _mean(entry, "pr", 0.5, pictures, notes),
-            "specular": 0.5,
+        metallic, metal = _share(entry, "pm", 0.0, pictures, notes)
+        roughness, rough = _share(entry, "pr", 0.5, pictures, notes)
+        values = {"base_color": base, "metallic": metallic, "roughness": roughness, "specular": 0.5}
+        shaped = {
+            name: map_ for name, map_ in (("metallic", metal), ("roughness", rough)) if map_ is not None
         }
     elif max(shine) > 0 and entry.number("illum", 2) >= 2:
         model, target = "blinn-phong", "diffuse"
@@ -172,7 +172,7 @@ def material_of(entry: Entry, pictures: Pictures, notes: Notes) -> Material:
         name=entry.name or "Material",
         model=model,
         values=values,
-        textures={} if texture is None else {target: texture},
+        textures={**({} if texture is None else {target: texture}), **shaped},
         opacity=_opacity(entry, pictures, notes),
     )
 
@@ -189,13 +189,19 @@ def _texture(entry: Entry, pictures: Pictures, notes: Notes) -> Texture | None:
     return Texture(opaque(image), statement.scale, statement.offset)
 
 
-def _mean(entry: Entry, key: str, default: float, pictures: Pictures, notes: Notes) -> float:
-    """A number in 0…1, or the mean of its map."""
+def _share(
+    entry: Entry, key: str, default: float, pictures: Pictures, notes: Notes
+) -> tuple[float, Texture | None]:
+    """A number in 0…1, and its map, which stands in its place; the map's mean where it is one colour."""
     statement = entry.maps.get(f"map_{key}")
-    if statement is not None and (image := pictures.file(statement.name)) is not None:
-        notes.say(f"The mean of {statement.name!r} is used for all of {entry.name!r}.")
-        return mean_of(image, 0)
-    return min(max(entry.number(key, default), 0.0), 1.0)
+    if statement is None or (image := pictures.file(statement.name)) is None:
+        return min(max(entry.number(key, default), 0.0), 1.0), None
+    if statement.clamped:
+        notes.say(f"The picture {statement.name!r} is repeated, though the file asks to clamp it.")
+    channel = channel_of(image, 0)
+    if channel is None:
+        return mean_of(image, 0), None
+    return 1.0, Texture(channel, statement.scale, statement.offset)
 
 
 def _opacity(entry: Entry, pictures: Pictures, notes: Notes) -> float:

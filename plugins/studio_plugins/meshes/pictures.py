@@ -15,6 +15,8 @@ from studio_core.imaging.io import ImageDecoder
 from studio_core.scene.geometry import Image
 from studio_plugins.meshes.common import Notes
 
+LEAST_SPREAD = 0.01  # of a channel that is more than noise about its mean
+
 
 class Pictures:
     """Pictures that a model names, each read once; what cannot be read becomes a note."""
@@ -62,6 +64,16 @@ def opaque(image: Image) -> Image:
         return image
     wanted = [0, 0, 0] if image.pixels.shape[2] == 1 else [0, 1, 2]
     return replace(image, pixels=image.pixels[:, :, wanted])
+
+
+def channel_of(image: Image, channel: int) -> Image | None:
+    """One channel as plain numbers (no transfer curve), grey has all; None where it is the same all over."""
+    chosen = min(channel, image.pixels.shape[2] - 1)
+    pixels = image.pixels[:, :, chosen : chosen + 1]
+    scale = 255.0 if pixels.dtype == np.uint8 else 1.0
+    if float(pixels.std(dtype=np.float64)) < LEAST_SPREAD * scale:
+        return None
+    return Image(pixels, "data")
 
 
 def mean_of(image: Image, channel: int) -> float:

@@ -7,6 +7,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from PySide6.QtWidgets import QFileDialog, QToolButton, QVBoxLayout, QWidget
 
 from studio_core.contract import Brdf
@@ -17,6 +18,7 @@ from studio_core.params import ParamInfo, Value, defaults, param_infos
 from studio_core.scene.geometry import Image, Texture
 from studio_core.scene.nodes import Material, MaterialId
 from studio_core.shading.job import Job
+from studio_core.shading.materials import shape_textures
 from studio_ui.context import Context
 from studio_ui.forms.fields import ColourField, Combo
 from studio_ui.forms.param_form import ParamForm, form_label, form_layout
@@ -87,9 +89,16 @@ class MaterialForm(QWidget):
         def done(image: Image) -> None:
             there = [m for m in materials if m in self._context.document.scene.materials]
             if there:
-                self._put_texture(there[-1], name, Texture(image))
+                self._put_texture(there[-1], name, Texture(self._meant(there[-1], name, image)))
 
         self._context.tasks.run(f"Reading {path.name}", read, done)
+
+    def _meant(self, material: MaterialId, name: str, image: Image) -> Image:
+        """The picture as plain numbers where it multiplies a number: maps of roughness are not encoded."""
+        model = self._brdf(self._context.document.scene.material(material).model)
+        infos = param_infos(model.Params) if model is not None else {}
+        colour = name not in infos or infos[name].kind == "colour"
+        return image if colour or image.pixels.dtype != np.uint8 else Image(image.pixels, "data")
 
     def _brdf(self, name: str) -> Brdf | None:
         if not self._context.warm:
@@ -121,7 +130,7 @@ class MaterialForm(QWidget):
             for name, field in self.form.fields.items():
                 if isinstance(field, ColourField) and field.menu is not None:
                     field.menu.metal = partial(self._put_metal, name)
-            for name in model.textures if len(materials) == 1 else ():
+            for name in (*model.textures, *shape_textures(model)) if len(materials) == 1 else ():
                 self._column.addWidget(self._texture(materials[0].id, name, infos[name].label))
         elif not self._context.warm:
             self._column.addWidget(note("Loading…"))

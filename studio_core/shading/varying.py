@@ -1,0 +1,223 @@
+"""Shapes that vary over a surface: a picture of the roughness gives every shading vertex a row of its own.
+
+Kernels look up a vertex' shape by a row of `Shapes`. A material with a picture of a shape parameter gets,
+beside the row of its mean, one for every value that its vertices have: the picture is averaged over the part
+of the surface that belongs to the vertex (mip levels, as sharp as the mesh is fine) and rounded to steps of
+1/255, or of a half, a quarter, … of that while no more than 255 of them lead from its darkest to its
+brightest texel. So a value is wrong by less than 1/255 of the picture's range, and texels of eight bits from
+black to white are not rounded at all. Several pictures of a material share at most MOST rows, with longer
+steps where need be.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+
+from studio_core.contract import Registry
+from studio_core.scene.geometry import Image, Texture
+from studio_core.scene.nodes import MaterialId, Scene
+from studio_core.scene.shading_mesh import NO_BACK
+from studio_core.scene.world_mesh import WorldMesh
+from studio_core.shading.artifacts import Shapes
+from studio_core.shading.materials import Resolved, finite_shape, first_channel, resolve, shapes
+
+F32 = npt.NDArray[np.float32]
+I32 = npt.NDArray[np.int32]
+I64 = npt.NDArray[np.int64]
+
+MOST = 1024
+LEAST_RANGE = 2.0**-12
+
+
+@dataclass(frozen=True, eq=False)
+class Grey:
+    """A picture's first channel, linear, rows from v = 0 up, halved level by level down to one texel."""
+
+    levels: tuple[F32, ...]
+
+    @classmethod
+    def of(cls, image: Image) -> Grey:
+        """Of a picture."""
+        level = np.ascontiguousarray(first_channel(image)[::-1])
+        levels = [level]
+        while max(level.shape) > 1:
+            height, width = max(level.shape[0] // 2, 1), max(level.shape[1] // 2, 1)
+            y, x = level.shape[0] // height, level.shape[1] // width
+            cut = level[: height * y, : width * x].reshape(height, y, width, x)
+            level = cut.mean(axis=(1, 3), dtype=np.float32)
+            levels.append(level)
+        return cls(tuple(levels))
+
+    @cached_property
+    def mean(self) -> float:
+        """Of all texels."""
+        return float(self.levels[0].mean(dtype=np.float64))
+
+    @cached_property
+    def range(self) -> tuple[float, float]:
+        """The darkest and the brightest texel."""
+        return float(self.levels[0].min()), float(self.levels[0].max())
+
+    def at(self, uvs: F32, area: F32) -> F32:
+        """(P,) means over squares about uvs (P, 2) that cover `area` (P,) of the picture, which repeats.
+
+        Bilinear on the two levels whose texels come next to the square, and linear between them.
+        """
+        height, width = self.levels[0].shape
+        texels = np.maximum(area.astype(np.float64) * height * width, 1.0)
+        place = np.minimum(0.5 * np.log2(texels), len(self.levels) - 1)
+        low = np.floor(place).astype(np.int64)
+        made = np.zeros(len(uvs), np.float32)
+        for level in np.unique(low).tolist():
+            own = np.flatnonzero(low == level)
+            finer = _bilinear(self.levels[level], uvs[own])
+            coarser = _bilinear(self.levels[min(level + 1, len(self.levels) - 1)], uvs[own])
+            made[own] = finer + (place[own] - level).astype(np.float32) * (coarser - finer)
+        return made
+
+
+def _bilinear(texels: F32, uvs: F32) -> F32:
+    height, width = texels.shape
+    x, y = uvs[:, 0].astype(np.float64) * width - 0.5, uvs[:, 1].astype(np.float64) * height - 0.5
+    x0, y0 = np.floor(x), np.floor(y)
+    fx, fy = x - x0, y - y0
+    i, j = x0.astype(np.int64), y0.astype(np.int64)
+    left, right, below, above = i % width, (i + 1) % width, j % height, (j + 1) % height
+    low = texels[below, left] * (1 - fx) + texels[below, right] * fx
+    high = texels[above, left] * (1 - fx) + texels[above, right] * fx
+    return np.asarray(low * (1 - fy) + high * fy, np.float32)
+
+
+def picture_areas(mesh: WorldMesh) -> F32:
+    """(V,) how much of the texture coordinates' plane belongs to each vertex: a third of its faces'."""
+    total = np.zeros(len(mesh))
+    seen = np.flatnonzero(mesh.back_faces[:, 0] != NO_BACK)
+    for faces in (mesh.faces, mesh.back_faces[seen]):
+        corners = mesh.uvs[faces].astype(np.float64)
+        one, other = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+        area = np.abs(one[:, 0] * other[:, 1] - one[:, 1] * other[:, 0]) / 6
+        total += np.bincount(faces.reshape(-1), np.repeat(area, 3), minlength=len(total))
+    return total.astype(np.float32)
+
+
+@dataclass(frozen=True, eq=False)
+class Steps:
+    """texels (R, K) that points have, and of each point (P,) which of them."""
+
+    texels: npt.NDArray[np.float64]
+    which: I64
+
+
+class ShapeTable:
+    """Makes `Shapes` with rows for what varies, keeping pictures and rows that did not change."""
+
+    def __init__(self, registry: Registry) -> None:
+        self._registry = registry
+        self._pictures: dict[str, Grey] = {}
+        self._uvs: F32 | None = None
+        self._areas: F32 = np.zeros(0, np.float32)
+        self._kept: dict[MaterialId, tuple[Mapping[str, Texture], I64, Steps]] = {}
+
+    def __call__(self, scene: Scene, materials: Sequence[MaterialId], mesh: WorldMesh) -> Shapes:
+        """For the vertices of a mesh whose `material` counts in `materials`."""
+        base, varying = self._begun(scene, materials)
+        if not varying:
+            self._uvs, self._kept = None, {}
+            return base
+        if self._uvs is not mesh.uvs:  # moved objects share it, refined ones do not
+            self._uvs, self._areas, self._kept = mesh.uvs, picture_areas(mesh), {}
+        found = []
+        kept = {}
+        for number, resolved in varying.items():
+            name, own = materials[number], np.flatnonzero(mesh.material == number)
+            textures, before, steps = self._kept.get(name, ({}, own, None))
+            if steps is None or textures != resolved.shaping or not np.array_equal(before, own):
+                steps = self._steps(resolved, mesh.uvs[own], self._areas[own])
+            kept[name] = (resolved.shaping, own, steps)
+            found.append((number, resolved, own, steps))
+        self._kept = kept
+        return _extended(base, mesh.material, found)
+
+    def at(self, scene: Scene, materials: Sequence[MaterialId], material: I32, uvs: F32) -> Shapes:
+        """For points of our own, material (P,) and uvs (P, 2), at which pictures are not averaged."""
+        base, varying = self._begun(scene, materials)
+        found = []
+        for number, resolved in varying.items():
+            own = np.flatnonzero(material == number)
+            nothing = np.zeros(len(own), np.float32)
+            found.append((number, resolved, own, self._steps(resolved, uvs[own], nothing)))
+        return _extended(base, material, found) if found else base
+
+    def _begun(self, scene: Scene, materials: Sequence[MaterialId]) -> tuple[Shapes, dict[int, Resolved]]:
+        """The rows of materials, and those materials that vary, by number; other pictures are forgotten."""
+        found = {}
+        for number, name in enumerate(materials):
+            material = scene.material(name)
+            if material.textures and (resolved := resolve(material, self._registry)).shaping:
+                found[number] = resolved
+        used = {t.image.key: t.image for resolved in found.values() for t in resolved.shaping.values()}
+        self._pictures = {key: self._pictures.get(key) or Grey.of(image) for key, image in used.items()}
+        base = shapes(scene, materials, self._registry, lambda image: self._pictures[image.key].mean)
+        return base, found
+
+    def _steps(self, resolved: Resolved, uvs: F32, area: F32) -> Steps:
+        """What the pictures of a material come to at some points."""
+        values, ranges = [], []
+        for texture in resolved.shaping.values():
+            grey, scale = self._pictures[texture.image.key], np.array(texture.scale, np.float32)
+            at = uvs * scale + np.array(texture.offset, np.float32)
+            values.append(grey.at(at, area * np.abs(scale[0] * scale[1])))
+            ranges.append(grey.range)
+        return stepped(np.stack(values, axis=1), ranges)
+
+
+def stepped(values: F32, ranges: Sequence[tuple[float, float]]) -> Steps:
+    """Values (P, K), each of a picture with a range, rounded to whole steps so that there are few rows."""
+    step = np.array([step_of(low, high) for low, high in ranges])
+    while True:
+        rounded = np.rint(values / step).astype(np.int64)
+        _, first, which = np.unique(rounded, axis=0, return_index=True, return_inverse=True)
+        if len(first) <= MOST:
+            return Steps(rounded[first] * step, which.reshape(-1))
+        step *= 2
+
+
+def step_of(low: float, high: float) -> float:
+    """The step of a picture's values: 1/255 times a power of two, at most 255 of them from low to high."""
+    return float(2.0 ** math.ceil(math.log2(max(high - low, LEAST_RANGE))) / 255)
+
+
+def _extended(base: Shapes, material: I32, found: Sequence[tuple[int, Resolved, I64, Steps]]) -> Shapes:
+    """The table with rows for what varies; `row` says which a point has."""
+    row = material.copy()
+    owner = [np.arange(len(base.address))]
+    offset, data = base.offset.tolist(), [base.data[:-1]]
+    length = len(base.data) - 1
+    for number, resolved, own, steps in found:
+        row[own] = len(offset) + steps.which
+        for texels in steps.texels:
+            offset.append(length)
+            data.append(finite_shape(resolved.brdf, resolved.scaled(texels.tolist())))
+            length += len(data[-1])
+        owner.append(np.full(len(steps.texels), number))
+    of = np.concatenate(owner).astype(np.int64)
+    flat = np.concatenate([*data, np.zeros(1, np.float32)])
+    return dataclasses.replace(
+        base,
+        address=base.address[of],
+        terms=base.terms[of],
+        offset=np.array(offset, np.int64),
+        data=flat,
+        owner=of,
+        row=row,
+    )
+
+
+__all__ = ["MOST", "Grey", "ShapeTable", "Steps", "picture_areas", "step_of", "stepped"]
