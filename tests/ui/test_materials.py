@@ -15,7 +15,7 @@ from PySide6.QtGui import QDragEnterEvent, QDragMoveEvent
 from PySide6.QtWidgets import QApplication, QLineEdit
 from ui_support import Driver, room
 
-from studio_core.edits import Add, AddMaterial, Assign, SetTexture
+from studio_core.edits import Add, AddMaterial, Assign, SetMaterial, SetTexture
 from studio_core.imaging.encode import write_png
 from studio_core.scene.geometry import Geometry, Image, Texture
 from studio_core.scene.nodes import Material, MeshObject
@@ -199,6 +199,17 @@ def test_the_slot_under_the_mouse_is_that_of_the_nearest_face(
     assert geometry.slots is not None
     expected = int(geometry.slots[found.face[0]]) if found.face[0] >= 0 else None
     assert slot_at(geometry, world, view, x, y) == expected
+
+
+def test_a_picture_of_the_roughness_is_plain_numbers(driver: Driver, tmp_path: Path) -> None:
+    path = tmp_path / "rough.png"
+    write_png(path, np.full((4, 4, 3), 120, np.uint8))
+    driver.document.apply(SetMaterial("red", {}, model="ggx"))
+    panel = choose(driver, "red")
+    for name, encoding in (("roughness", "data"), ("metallic", "data"), ("base_color", "srgb")):
+        panel.load_picture(name, path)
+        driver.until(lambda name=name: name in driver.document.scene.material("red").textures)
+        assert driver.document.scene.material("red").textures[name].image.encoding == encoding
 
 
 def test_pictures_are_laid_repeated_and_taken_away(driver: Driver, tmp_path: Path) -> None:

@@ -20,6 +20,7 @@ from studio_core.brdfs.albedo import quadrature_albedo
 from studio_core.brdfs.calls import evaluate
 from studio_core.brdfs.quadrature import over_hemisphere
 from studio_core.params import ParamInfo, defaults, param_infos
+from studio_core.shading.materials import shape_textures
 from studio_plugins.brdfs import plugin as bundled
 
 Float = npt.NDArray[np.float32]
@@ -248,6 +249,19 @@ def test_coefficients_are_per_texel(model: Any) -> None:
     one = {**plain, **{name: texel[2, 3] for name, texel in texels.items()}}
     np.testing.assert_array_equal(made[2, 3], model.coefficients(one))
     assert set(model.textures) <= set(split(model)[1])
+
+
+@every_model
+def test_pictures_of_the_shape_are_of_its_numbers_and_colour_nothing(model: Any) -> None:
+    infos, shaping = param_infos(model.Params), split(model)[0]
+    for name in shape_textures(model):
+        assert name in shaping
+        assert infos[name].kind == "number"
+        if name not in model.textures:
+            varied = ({**defaults(model.Params), name: at(infos[name], f)} for f in (0, 0.6, 1))
+            made = [coefficients(model, values) for values in varied]
+            np.testing.assert_array_equal(made[0], made[1])
+            np.testing.assert_array_equal(made[0], made[2])
 
 
 @every_model

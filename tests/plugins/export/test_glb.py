@@ -28,6 +28,7 @@ from studio_core.scene.nodes import (
 )
 from studio_core.scene.transform import Transform, looking
 from studio_plugins.export.glb import EXPORTER
+from studio_plugins.meshes.gltf import IMPORTER
 
 
 def exported(scene: Scene, host: PluginHost, folder: Path) -> tuple[dict[str, Any], bytes, tuple[str, ...]]:
@@ -171,6 +172,34 @@ def test_textures_of_metal_and_of_light(host: PluginHost, parts: Any, tmp_path: 
     metal = read_image(data, "metal.png").pixels
     np.testing.assert_array_equal(metal[..., 2], np.rint(pixels[..., 0] * 255))
     assert (metal[..., 1] == 255).all()
+
+
+def test_textures_of_metal_and_roughness_are_one(host: PluginHost, parts: Any, tmp_path: Path) -> None:
+    """Of two sizes; read again, they are the pictures they were."""
+    rough = np.linspace(0.1, 1, 16).reshape(4, 4, 1)
+    metal = np.array([[0.0, 1.0], [1.0, 0.4]]).reshape(2, 2, 1)
+    pictures = {
+        "roughness": Texture(Image(np.rint(255 * rough).astype(np.uint8), "data")),
+        "metallic": Texture(Image(np.rint(255 * metal).astype(np.uint8), "data")),
+    }
+    material = Material(id="m", model="ggx", values={"roughness": 0.7, "metallic": 0.9}, textures=pictures)
+    scene = box(material, parts["cube"]())
+    document, _, _ = exported(scene, host, tmp_path)
+    assert len(document["images"]) == 1
+    again = IMPORTER.load(next(tmp_path.glob("*.glb"))).materials[0]
+    assert again.values["roughness"] == pytest.approx(0.7)
+    assert again.values["metallic"] == pytest.approx(0.9)
+    np.testing.assert_array_equal(
+        again.textures["roughness"].image.pixels, pictures["roughness"].image.pixels
+    )
+    doubled = pictures["metallic"].image.pixels.repeat(2, axis=0).repeat(2, axis=1)
+    np.testing.assert_array_equal(again.textures["metallic"].image.pixels, doubled)
+    moved = {**pictures, "metallic": Texture(pictures["metallic"].image, (2.0, 2.0))}
+    scene = box(dataclasses.replace(material, textures=moved), parts["cube"]())
+    document, _, notes = exported(scene, host, tmp_path)
+    made = document["materials"][0]["pbrMetallicRoughness"]
+    assert made["roughnessFactor"] == pytest.approx(0.7 * rough.mean(), abs=2e-3)
+    assert any("roughness" in note for note in notes)
 
 
 def test_meshes_without_normals_get_the_studios(host: PluginHost, parts: Any, tmp_path: Path) -> None:

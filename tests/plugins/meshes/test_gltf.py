@@ -224,19 +224,56 @@ def test_transparency(tmp_path: Path) -> None:
     assert with_material(tmp_path, extensions=diamond)[0].values["specular"] == 1.0
 
 
-def test_the_mean_of_a_metallic_roughness_picture_is_used(tmp_path: Path) -> None:
+def metal_and_roughness(tmp_path: Path, pixels: Any, pbr: dict[str, Any], colour: Any = None) -> Any:
+    """A material with a metallic-roughness picture, and one of the colour."""
     made = square(material=0)
-    pixels = np.zeros((2, 2, 3), np.uint8)
-    pixels[:, :, 1], pixels[0, :, 2] = 51, 255
+    pictures = [pixels] if colour is None else [pixels, colour]
     made.json |= {
-        "images": [{"bufferView": made.view(encode_png(pixels))}],
-        "textures": [{"source": 0}],
-        "materials": [{"pbrMetallicRoughness": {"metallicRoughnessTexture": {"index": 0}}}],
+        "images": [{"bufferView": made.view(encode_png(p))} for p in pictures],
+        "textures": [{"source": n} for n in range(len(pictures))],
+        "materials": [{"pbrMetallicRoughness": {"metallicRoughnessTexture": {"index": 0}, **pbr}}],
     }
     model = load(tmp_path, made)
-    assert model.materials[0].values["metallic"] == pytest.approx(0.5)
-    assert model.materials[0].values["roughness"] == pytest.approx(0.2)
-    assert any("mean" in note for note in model.notes)
+    return model.materials[0], model.notes
+
+
+def test_a_metallic_roughness_picture_is_one_of_each(tmp_path: Path) -> None:
+    pixels = np.zeros((2, 2, 3), np.uint8)
+    pixels[:, 0, 1], pixels[:, 1, 1], pixels[0, :, 2] = 51, 102, 255
+    made, notes = metal_and_roughness(tmp_path, pixels, {"roughnessFactor": 0.5, "metallicFactor": 0.8})
+    assert (made.values["roughness"], made.values["metallic"]) == (0.5, 0.8)
+    for name, channel in (("roughness", 1), ("metallic", 2)):
+        image = made.textures[name].image
+        assert image.encoding == "data"
+        np.testing.assert_array_equal(image.pixels[..., 0], pixels[..., channel])
+    assert not any("mean" in note for note in notes)
+
+
+def test_a_channel_that_is_one_colour_is_a_number(tmp_path: Path) -> None:
+    pixels = np.zeros((2, 2, 3), np.uint8)
+    pixels[:, :, 1], pixels[:, :, 2] = 51, 255
+    made, _ = metal_and_roughness(tmp_path, pixels, {})
+    assert made.values["roughness"] == pytest.approx(0.2)
+    assert made.values["metallic"] == 1
+    assert made.textures == {}
+
+
+def test_metal_that_lies_otherwise_than_colour_is_its_mean(tmp_path: Path) -> None:
+    pixels = np.zeros((2, 2, 3), np.uint8)
+    pixels[0] = 255
+    moved = {"index": 1, "extensions": {"KHR_texture_transform": {"scale": [2, 2]}}}
+    colour = np.full((2, 2, 3), 128, np.uint8)
+    made, notes = metal_and_roughness(tmp_path, pixels, {"baseColorTexture": moved}, colour)
+    assert set(made.textures) == {"base_color", "roughness"}
+    assert made.textures["base_color"].scale == (2, 2)
+    assert made.textures["roughness"].scale == (1, 1)
+    assert made.values["metallic"] == pytest.approx(0.5)
+    assert any("lies otherwise" in note for note in notes)
+    other = {"index": 1, "texCoord": 1}
+    made, notes = metal_and_roughness(tmp_path, pixels, {"baseColorTexture": other}, colour)
+    assert set(made.textures) == {"base_color"}
+    assert made.values["roughness"] == pytest.approx(0.5)
+    assert any("mean" in note for note in notes)
 
 
 def test_a_damaged_picture_is_a_note(tmp_path: Path) -> None:

@@ -140,6 +140,19 @@ def test_materials_become_the_model_that_fits(tmp_path: Path) -> None:
     }
 
 
+def test_pictures_of_roughness_and_metal(tmp_path: Path) -> None:
+    rough = np.array([[[10], [200]]], np.uint8)
+    (tmp_path / "rough.png").write_bytes(encode_png(rough))
+    (tmp_path / "metal.png").write_bytes(encode_png(np.full((1, 2, 1), 255, np.uint8)))
+    made, _ = material(tmp_path, "Kd 1 1 1\nPr 0.1\nmap_Pr -s 2 2 rough.png\nmap_Pm metal.png\n")
+    assert made.model == "ggx"
+    assert (made.values["roughness"], made.values["metallic"]) == (1.0, 1.0)
+    assert set(made.textures) == {"roughness"}
+    np.testing.assert_array_equal(made.textures["roughness"].image.pixels[..., :1], rough)
+    assert made.textures["roughness"].image.encoding == "data"
+    assert made.textures["roughness"].scale == (2.0, 2.0)
+
+
 @pytest.mark.parametrize(
     ("statements", "opacity"),
     [("d 0.3", 0.3), ("Tr 0.3", 0.7), ("Tr 0.9\nd 0.4", 0.4), ("d 7", 1.0), ("", 1.0), ("d oops", 1.0)],
