@@ -25,6 +25,8 @@ from studio_core.kernels.sampling import (
     TURN,
     around_mirror,
     around_normal,
+    bounced_density,
+    bounced_direction,
     cosine_density,
     cosine_direction,
     power_height,
@@ -33,6 +35,8 @@ from studio_core.kernels.sampling import (
 )
 
 F = np.float32
+_LEAST_SHARE, _ROUGH_SHARE = np.float32(0.02), np.float32(0.4)
+_BELOW_ONE = np.float32(1 - 2**-24)
 
 
 @kernel
@@ -132,13 +136,72 @@ def weigh_visible(o: Any, alpha: F, w: Any, d: Any) -> None:
         d[k] = lit * scale * ggx_distribution(x[k] + ox, y[k] + oy, height, alpha)
 
 
+@kernel
+def draw_bounced(o: Any, alpha: F, u: Any, w: Any) -> None:
+    """As light leaves that bounced between GGX facets: flat for small α."""
+    count = len(u) // 2
+    for k in range(count):
+        x, y, z = bounced_direction(alpha, u[k], u[count + k])
+        w[k], w[count + k] = x, y
+        w[2 * count + k] = z if o[2] > ZERO else -ONE
+
+
+@kernel
+def weigh_bounced(o: Any, alpha: F, w: Any, d: Any) -> None:
+    """Density of `draw_bounced`."""
+    count = len(d)
+    z = w[2 * count :]
+    seen = ONE if o[2] > ZERO else ZERO
+    for k in range(count):
+        d[k] = seen * bounced_density(alpha, z[k])
+
+
+@kernel
+def draw_skin(o: Any, alpha: F, u: Any, w: Any) -> None:
+    """By `draw_visible` and, the rougher the more, by `draw_bounced`: for both in one term."""
+    count = len(u) // 2
+    share, up = _bounced_share(alpha), max(o[2], LEAST_HEIGHT)
+    for k in range(count):
+        if u[k] < share:
+            x, y, z = bounced_direction(alpha, min(u[k] / share, _BELOW_ONE), u[count + k])
+        else:
+            u0 = min((u[k] - share) / (ONE - share), _BELOW_ONE)
+            hx, hy, hz = visible_normal(o[0], o[1], up, alpha, alpha, u0, u[count + k])
+            x, y, z = reflected(o[0], o[1], o[2], hx, hy, hz)
+        w[k], w[count + k] = x, y
+        w[2 * count + k] = z if o[2] > ZERO else -ONE
+
+
+@kernel
+def weigh_skin(o: Any, alpha: F, w: Any, d: Any) -> None:
+    """Density of `draw_skin`."""
+    count = len(d)
+    z = w[2 * count :]
+    share = _bounced_share(alpha)
+    seen = share if o[2] > ZERO else ZERO
+    weigh_visible(o, alpha, w, d)
+    for k in range(count):
+        d[k] = (ONE - share) * d[k] + seen * bounced_density(alpha, z[k])
+
+
+@kernel
+def _bounced_share(alpha: F) -> F:
+    """Of the draws of a skin: about what one bounce leaves out, and never nothing."""
+    made: F = _LEAST_SHARE + _ROUGH_SHARE * min(alpha, ONE)
+    return made
+
+
 __all__ = [
+    "draw_bounced",
     "draw_cosine",
     "draw_half_power",
     "draw_mirror_power",
+    "draw_skin",
     "draw_visible",
+    "weigh_bounced",
     "weigh_cosine",
     "weigh_half_power",
     "weigh_mirror_power",
+    "weigh_skin",
     "weigh_visible",
 ]

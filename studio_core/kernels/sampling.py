@@ -98,3 +98,21 @@ def visible_normal(ox: F, oy: F, oz: F, ax: F, ay: F, u0: F, u1: F) -> Vector:
     size = np.sqrt(hx * hx + hy * hy + hz * hz)
     scale = ONE / max(size, LEAST_LENGTH)
     return hx * scale, hy * scale, hz * scale
+
+
+@kernel
+def bounced_direction(alpha: F, u0: F, u1: F) -> Vector:
+    """A direction with density ∝ cos θ / (cos² θ + α²): about as light leaves GGX's facets after bounces."""
+    a2 = alpha * alpha
+    squared = min(a2 * np.expm1(u0 * np.log1p(ONE / a2)), ONE)
+    r, phi = np.sqrt(ONE - squared), TURN * u1
+    return r * np.cos(phi), r * np.sin(phi), np.sqrt(squared)
+
+
+@kernel
+def bounced_density(alpha: F, z: F) -> F:
+    """Density of `bounced_direction`: cos θ / (π (cos² θ + α²) ln(1 + 1 / α²))."""
+    a2 = alpha * alpha
+    up = max(z, ZERO)
+    made: F = up * INV_PI / ((up * up + a2) * np.log1p(ONE / a2))
+    return made
