@@ -69,13 +69,13 @@ def reciprocity(brdf: Brdf, shape: F32, directions: F32) -> float:
 def weight_bound(brdf: SampledBrdf, shape: F32, wo: F32, term: int, u: F32, others: F32) -> float:
     """Largest b_k cos / density, for directions drawn with u (N, 2) and for `others` (M, 3); inf without one.
 
-    Relative to the largest albedo of the term at 0…89°, so 1 is a perfect draw of a term that loses nothing.
+    Relative to the term's largest albedo up to 89.9°, so 1 is a perfect draw of what loses nothing.
     """
     wi = np.concatenate([sample(brdf, shape, wo, term, u), others])
     wi = wi[wi[:, 2] > 0]
     drawn = density(brdf, shape, wo, wi)[:, term].astype(np.float64)
     value = evaluate(brdf, shape, wo, wi)[:, term] * wi[:, 2].astype(np.float64)
-    largest = float(term_albedo(brdf, shape, np.radians([0, 30, 60, 80, 89])).max(axis=0)[term])
+    largest = float(term_albedo(brdf, shape, np.radians([0, 30, 60, 80, 89, 89.9])).max(axis=0)[term])
     if not value.any():
         return 0.0
     weight = np.divide(value, drawn, out=np.full_like(drawn, np.inf), where=drawn > 0)
