@@ -17,7 +17,7 @@ from ui_support import Driver, room
 
 from studio_core.edits import Add, AddMaterial, Assign, SetMaterial, SetTexture
 from studio_core.imaging.encode import write_png
-from studio_core.scene.geometry import Geometry, Image, Texture
+from studio_core.scene.geometry import Geometry, Image, Table, Texture
 from studio_core.scene.nodes import Material, MeshObject
 from studio_core.scene.transform import Transform, looking
 from studio_core.session import View
@@ -250,3 +250,28 @@ def test_another_theme_after_other_forms(driver: Driver) -> None:
     driver.do("view.light")
     driver.do("view.dark")
     assert room().materials.keys() == panel.list.rows.keys()
+
+
+def test_a_kind_is_fitted_to_a_measurement(driver: Driver) -> None:
+    values = np.full((12, 6, 6, 3), 0.1, np.float32)
+    values[..., 1] = 0.05
+    measured = Material(
+        id="felt", name="Felt", model="measured", tables={"measurement": Table(values, "Felt")}
+    )
+    driver.document.apply(AddMaterial(measured))
+    form = choose(driver, "felt").editor
+    driver.until(lambda: form.measurement is not None)
+    assert form.measurement is not None
+    assert not form.measurement.fit.isVisibleTo(form)  # it is shown as it was measured
+    driver.document.apply(SetMaterial("felt", model="lambert"))
+    driver.until(lambda: form.measurement is not None and form.measurement.fit.isVisibleTo(form))
+    form.measurement.fit.click()
+    driver.until(lambda: driver.labels()[-1] == "Fit Felt to its measurement")
+    found = driver.document.scene.material("felt")
+    np.testing.assert_allclose(found.values["base_color"], np.pi * np.array([0.1, 0.05, 0.1]), rtol=1e-3)
+    driver.until(lambda: form.measurement.error.text().startswith("Off by 0.0%"))
+    driver.document.apply(SetMaterial("felt", {"base_color": (0.5, 0.5, 0.5)}))
+    driver.until(lambda: form.measurement.error.text() == "")
+    driver.do("edit.undo")
+    driver.do("edit.undo")
+    assert driver.document.scene.material("felt").values == {}

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from PySide6.QtWidgets import QFileDialog, QToolButton, QVBoxLayout, QWidget
@@ -15,7 +15,7 @@ from studio_core.edits import Compound, Edit, SetMaterial, SetTexture
 from studio_core.errors import PluginError
 from studio_core.metals import Metal
 from studio_core.params import ParamInfo, Value, defaults, param_infos
-from studio_core.scene.geometry import Image, Texture
+from studio_core.scene.geometry import Image, Table, Texture
 from studio_core.scene.nodes import Material, MaterialId
 from studio_core.shading.job import Job
 from studio_core.shading.materials import shape_textures
@@ -25,8 +25,12 @@ from studio_ui.forms.param_form import ParamForm, form_label, form_layout
 from studio_ui.forms.sinks import EditSink
 from studio_ui.forms.spin import MIXED
 from studio_ui.look.theme import GAP
+from studio_ui.panels.measurement_row import MeasurementRow, measurement_of
 from studio_ui.panels.panel import clear, note
 from studio_ui.panels.texture_row import TextureRow
+
+if TYPE_CHECKING:
+    from studio_core.brdfs.fitting import Fit
 
 _COMMON: Mapping[str, ParamInfo] = param_infos(Material)
 PICTURES = "Pictures (*.png *.jpg *.jpeg *.exr *.hdr *.tif *.tiff)"
@@ -43,6 +47,8 @@ class MaterialForm(QWidget):
         self.kind = Combo()
         self.kinds: list[str] = []
         self.textures: dict[str, TextureRow] = {}
+        self.measurement: MeasurementRow | None = None
+        self._fitted: Mapping[str, Value] | None = None
         self._context, self._tool = context, tool
         self._sink = EditSink(context.editing, self._make, self._label)
         self._built: object = self
@@ -57,7 +63,8 @@ class MaterialForm(QWidget):
         materials = [scene.material(m) for m in chosen]
         models = {material.model for material in materials}
         model = self._brdf(materials[0].model) if len(models) == 1 else None
-        key = (chosen, models, model is not None, self._context.warm)
+        tables = [measurement_of(material) for material in materials]
+        key = (chosen, models, model is not None, self._context.warm, tables)
         if key != self._built:
             self._built = key
             self._build(materials, model)
@@ -76,6 +83,8 @@ class MaterialForm(QWidget):
             self.form.show_values(every[-1], mixed)
         for name, shown in self.textures.items():
             shown.show_texture(last.textures.get(name))
+        if self.measurement is not None and last.values != self._fitted:
+            self.measurement.tell("")  # it was of other values
 
     def load_picture(self, name: str, path: Path) -> None:
         """Read a picture away from the window's thread, then lay it on the surface."""
@@ -113,6 +122,7 @@ class MaterialForm(QWidget):
         clear(self._column)
         self.form = self.common = None
         self.textures = {}
+        self.measurement = None
         if not materials:
             self._column.addWidget(note("The scene has no materials yet."))
             return
@@ -123,6 +133,9 @@ class MaterialForm(QWidget):
         self.common = ParamForm(_COMMON, self._sink, defaults=usual)
         self._column.addWidget(self.common)
         self._column.addWidget(self._kinds(materials))
+        table = measurement_of(materials[0]) if len(materials) == 1 else None
+        if table is not None:
+            self._column.addWidget(self._measurement(table, model))
         if model is not None:
             infos = param_infos(model.Params)
             self.form = ParamForm(infos, self._sink, defaults=defaults(model.Params))
@@ -168,6 +181,42 @@ class MaterialForm(QWidget):
         self.textures[name] = made
         layout.addRow(form_label(f"{label} map", "A picture that the value is multiplied with"), made)
         return box
+
+    def _measurement(self, table: Table, model: Brdf | None) -> QWidget:
+        box = QWidget()
+        layout = form_layout(box)
+        self.measurement = MeasurementRow(table, model, self.fit_to_measurement)
+        told = "What was measured; the kind Measured shows it as it is"
+        layout.addRow(form_label("Measurement", told), self.measurement)
+        return box
+
+    def fit_to_measurement(self) -> None:
+        """The values with which the chosen kind comes nearest to the measurement, found in the background."""
+        material = self._context.document.scene.material(self.materials[0])
+        model, table = self._brdf(material.model), measurement_of(material)
+        if model is None or table is None:
+            return
+        reflects: Brdf = model
+
+        def work(job: Job) -> Fit:
+            from studio_core.brdfs.fitting import fit
+            from studio_core.brdfs.samples import of_table
+
+            return fit(reflects, of_table(table), job=job)
+
+        def done(found: Fit) -> None:
+            there = self._context.document.scene.materials.get(material.id)
+            if there is None or there.model != found.model:
+                return  # something else was chosen meanwhile
+            told = f"Off by {found.difference.rmse:.1%} (relative RMSE), metric {found.difference.metric:.2g}"
+            self._fitted = {**there.values, **found.values}
+            label = f"Fit {material.name} to its measurement"
+            if self._context.editing.apply(SetMaterial(material.id, found.values, label=label)):
+                self._context.journal.write(f"{material.name} fitted by {reflects.label}: {told}.")
+            if self.measurement is not None and self.materials == (material.id,):
+                self.measurement.tell(told)
+
+        self._context.tasks.run(f"Fitting {reflects.label} to {material.name}", work, done)
 
     def _ask_picture(self, name: str) -> None:
         path, _ = QFileDialog.getOpenFileName(self, "Picture for the material", "", PICTURES)
