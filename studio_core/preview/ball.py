@@ -3,9 +3,9 @@
 The eye is far away, so light and reflectance meet on rings of equal angle to the view: there the model's
 kernel is called once a ring, and the light along a fan of directions (`preview.fan`) is looked up once a
 light. Their product, a small matrix product, is what another roughness costs; another colour only multiplies
-terms with coefficients, pixel by pixel, through the ball's own texture coordinates. Nothing stands around
-the ball: it casts no shadow on itself and mirrors the environment alone. Suns are widened to what rings can
-show, about 2°, and keep their light.
+terms with coefficients, pixel by pixel, through the ball's own texture coordinates. Models with a grain are
+called at every point, of fewer. Nothing stands around the ball: it casts no shadow on itself and mirrors the
+environment alone. Suns are widened to what rings can show, about 2°, and keep their light.
 """
 
 from __future__ import annotations
@@ -34,7 +34,12 @@ SMALL = 72  # pixels up to which fewer rings do
 _TEXELS = 512  # of a texture's longer side
 _SPREAD = 1.5  # radius of a sun in steps from ring to ring
 _AROUND = 6  # directions around the middle of a widened sun
-_LIGHTS, _TERMS, _TEXTURES = 3, 24, 16  # kept
+_LIGHTS, _TERMS, _TEXTURES = 4, 24, 16  # kept
+_COARSE = (
+    20,
+    40,
+)  # rings and points on each: for small balls, and where every point needs a kernel of its own
+_COARSE_SUNS = (24, 72)
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,9 +80,9 @@ class Balls:
             raise ValueError(f"a ball of {size} pixels shows nothing")
         resolved = resolve(material, self._registry)
         shape = np.atleast_1d(np.asarray(resolved.brdf.shape(resolved.values), np.float32))
-        key = (light.key, size, resolved.brdf.id, resolved.brdf.address, shape.tobytes())
+        key = (light.key, size, resolved.brdf, shape.tobytes())
         terms = self._terms.get(key, lambda: self._sum(resolved.brdf, shape, light, size))
-        at = disc(size, *_rings(size))
+        at = disc(size, *_COARSE)  # whatever rings there were: pixels and their places are the same
         colour = np.einsum("pkc,pkc->pc", terms, self._coefficients(resolved, at.uv), optimize=False)
         made = np.zeros((size, size, 4), np.float32)
         made[at.rows, at.columns, :3] = np.nan_to_num(colour, nan=0.0, posinf=3e38, neginf=0.0)
@@ -86,9 +91,10 @@ class Balls:
 
     def _sum(self, brdf: Brdf, shape: F32, light: PreviewLight, size: int) -> F32:
         """(P, terms, 3): light times kernels, over all directions."""
-        lit = self._lit.get((light.key, *_rings(size), *_fine(size)), lambda: self._gather(light, size))
-        self.counts["summed"] += 1
         grained = _has_grain(brdf, shape)
+        rings, fine = (_COARSE, _COARSE_SUNS) if grained else (_rings(size), _fine(size))
+        lit = self._lit.get((light.key, rings, fine), lambda: self._gather(light, rings, fine))
+        self.counts["summed"] += 1
         turns = lit.points.frames.shape[1]
         made = np.empty((len(lit.fans), turns, 3, brdf.terms), np.float32)
         for ring, own in enumerate(lit.fans):
@@ -102,10 +108,10 @@ class Balls:
                 self.counts["kernels"] += 1
                 values = evaluate(brdf, shape, _turned(own.wo, angle), _turned(own.wi, angle))
                 made[ring, turn] = sky[3 * turn : 3 * turn + 3] @ (values * weight)
-        pixels = over_disc(made, disc(size, *_rings(size)))
+        pixels = over_disc(made, disc(size, *rings))
         if lit.sun is not None and lit.irradiance is not None:
             shone = self._shine(brdf, shape, lit.fine, lit.sun, lit.irradiance, grained)
-            pixels = pixels + over_disc(shone, disc(size, *_fine(size)))
+            pixels = pixels + over_disc(shone, disc(size, *fine))
         return np.ascontiguousarray(pixels.transpose(0, 2, 1))
 
     def _shine(self, brdf: Brdf, shape: F32, points: Sphere, sun: F32, irradiance: F32, grained: bool) -> F32:
@@ -125,9 +131,9 @@ class Balls:
         self.counts["kernels"] += rings * (turns if grained else 1)
         return made
 
-    def _gather(self, light: PreviewLight, size: int) -> _Lit:
+    def _gather(self, light: PreviewLight, rings: tuple[int, int], finer: tuple[int, int]) -> _Lit:
         self.counts["gathered"] += 1
-        points, fine = sphere(*_rings(size)), sphere(*_fine(size))
+        points, fine = sphere(*rings), sphere(*finer)
         fans = tuple(fan(float(cosine)) for cosine in points.cosines)
         turns = points.frames.shape[1]
         sky = np.empty((len(fans), turns * 3, DIRECTIONS), np.float32)
@@ -202,7 +208,7 @@ class _Kept(Generic[T]):
 
 def _rings(size: int) -> tuple[int, int]:
     """Rings and points on each that the sky is gathered at."""
-    return (20, 40) if size <= SMALL else (48, 96)
+    return _COARSE if size <= SMALL else (48, 96)
 
 
 def _fine(size: int) -> tuple[int, int]:

@@ -193,6 +193,18 @@ def test_grain_follows_the_texture_coordinates() -> None:
     assert across == pytest.approx(np.pi / 24, rel=0.06)
 
 
+def test_another_model_of_the_same_name_is_another_ball() -> None:
+    models = [Brushed(), Brushed()]
+    models[1].coefficients = lambda values: np.full((1, 3), 0.5, np.float32)  # type: ignore[method-assign]
+    host: Any = SimpleNamespace(brdf=lambda name: models[-1])
+    balls, light = Balls(host), environment_light(None)
+    half = balls.picture(material("brushed"), light, SIZE).pixels
+    models.pop()
+    whole = balls.picture(material("brushed"), light, SIZE).pixels
+    assert balls.counts["summed"] == 2  # tables of a measured model are no part of its shape's numbers
+    np.testing.assert_allclose(whole[..., :3], 2 * half[..., :3], rtol=1e-5)
+
+
 def test_points_and_pixels_agree() -> None:
     points, at = sphere(20, 40), disc(40, 20, 40)
     np.testing.assert_allclose(

@@ -36,6 +36,8 @@ class MaterialThumbnails:
         pixels = max(round(self._size * ratio), 8)
         key = (_look(material), light_of(environment), pixels)
         old = self._icons.get(material.id)
+        if old is not None and self._context.editing.busy:
+            return old[1]  # the ball beside the form is followed; lists are drawn at rest
         if key not in self._balls:
             if self._context.warm and self._asked.get(material.id) != key:
                 self._asked[material.id] = key
@@ -80,7 +82,8 @@ def _look(material: Material) -> Hashable:
         (name, weakref.ref(one.image), one.scale, one.offset)
         for name, one in sorted(material.textures.items(), key=lambda item: item[0])
     )
-    return material.model, values, textures, material.opacity
+    tables = tuple((name, weakref.ref(table)) for name, table in sorted(material.tables.items()))
+    return material.model, values, textures, tables, material.opacity
 
 
 __all__ = ["MaterialThumbnails"]
