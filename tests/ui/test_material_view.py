@@ -87,6 +87,8 @@ def test_the_ball_stands_in_the_scenes_light_as_the_view_shows_it(driver: Driver
 def test_a_dragged_slider_is_followed_and_is_one_step(driver: Driver) -> None:
     panel = shown(driver)
     strip, history = panel.strip, len(driver.labels())
+    strip.shown["Albedo"].setChecked(True)
+    rest(driver, panel)
     field = panel.form.fields["roughness"] if panel.form else None
     assert isinstance(field, NumberField)
     assert field.slider is not None

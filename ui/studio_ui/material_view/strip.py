@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 from PySide6.QtCore import QSignalBlocker, QSize, Qt, QTimer
 from PySide6.QtGui import QAction, QResizeEvent, QShowEvent
 from PySide6.QtWidgets import QGridLayout, QMenu, QSizePolicy, QToolButton, QVBoxLayout, QWidget
@@ -117,7 +119,7 @@ class MaterialStrip(QWidget):
             self.lobe.cosine,
             self._on("Lobe"),
             self._on("Albedo"),
-            quick=busy,
+            quick=busy and self._on("Albedo"),
             environment=environment,
         )
 
@@ -125,6 +127,9 @@ class MaterialStrip(QWidget):
         wish = self.wish()
         if wish is None or not self.isVisible() or (wish == self._asked and self.seen is not None):
             return
+        if wish.albedo and not wish.quick:
+            rough = dataclasses.replace(wish, quick=True)
+            wish = wish if self._asked == rough else rough  # exact albedo comes after all that is quick
         self._asked = wish
         self._work.see(wish, self._see)
 
@@ -136,6 +141,8 @@ class MaterialStrip(QWidget):
         self.albedo.incidence = self.lobe.incidence
         self.albedo.show_albedo(own.albedo if own else None, other.albedo if other else None)
         self._show_balls()
+        if seen is not None and seen.wish.quick:
+            self.refresh()  # at rest it is made exact
 
     def _show_balls(self) -> None:
         seen, session = self.seen, self._context.session
@@ -244,7 +251,7 @@ class MaterialStrip(QWidget):
             self._grid.addWidget(view, index // columns, index % columns)
         for column in range(len(self.views)):  # plots are wider than high
             plot = column < columns and bool(views) and views[column] is not self.ball
-            self._grid.setColumnStretch(column, 3 if plot else 2 if column < columns else 0)
+            self._grid.setColumnStretch(column, 6 if plot else 5 if column < columns else 0)
         self._box.setVisible(bool(views) and self.fold.isChecked())
 
     def _offer(self) -> None:
