@@ -237,6 +237,11 @@ def test_views_lie_side_by_side_where_there_is_room(driver: Driver, qtbot: QtBot
         return len(found)
 
     assert [rows(width) for width in (500, 290, 150, 500)] == [1, 2, 3, 1]
+    strip.resize(300, strip.minimumSizeHint().height() + 20)
+    assert not strip.ball.isVisible()  # no room: nothing is made, and the form has it
+    assert strip.wish() is None
+    strip.resize(300, strip.sizeHint().height())
+    assert strip.ball.isVisible()
     strip.shown["Lobe"].setChecked(False)
     assert strip._grid.count() == 2
     strip.close_strip()

@@ -28,7 +28,7 @@ class BallView(QWidget):
         self._images: tuple[QImage | None, QImage | None] = (None, None)
         self._clear = False
         self.setAccessibleName("Ball")
-        self.setMinimumSize(100, 100)
+        self.setMinimumSize(60, 60)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
 
     @property

@@ -27,7 +27,7 @@ class Plot(QWidget):
         self.theme = DARK
         self.luminance = False
         self.setAccessibleName(name)
-        self.setMinimumSize(110, 100)
+        self.setMinimumSize(90, 60)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
 
     def set_theme(self, theme: Theme) -> None:

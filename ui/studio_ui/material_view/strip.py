@@ -20,7 +20,7 @@ from studio_ui.material_view.polar_plot import PolarPlot
 from studio_ui.material_view.work import PreviewWork, Seen, Wish, light_of
 from studio_ui.panels.panel import row
 
-_NARROWEST, _WIDEST = 118, 240  # pixels of a view
+_NARROWEST, _LOWEST = 118, 70  # pixels of a view
 _ALONE = "Compare with…"
 
 
@@ -36,6 +36,7 @@ class MaterialStrip(QWidget):
         self._asked: Wish | None = None
         self._offered: list[tuple[MaterialId, str]] = []
         self._columns = 0
+        self._views = 0
         self._arranging = False
         self.ball, self.lobe, self.albedo = BallView(), PolarPlot(), AlbedoPlot()
         self.views: dict[str, QWidget] = {"Ball": self.ball, "Lobe": self.lobe, "Albedo": self.albedo}
@@ -53,9 +54,10 @@ class MaterialStrip(QWidget):
         column.setContentsMargins(0, 0, 0, 0)
         column.setSpacing(GAP)
         column.setSizeConstraint(QVBoxLayout.SizeConstraint.SetNoConstraint)
-        column.addLayout(row(self.fold, self.compare, self._options(), stretch=1))
-        column.addWidget(self._box)
-        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
+        self._header = row(self.fold, self.compare, self._options(), stretch=1)
+        column.addLayout(self._header)
+        column.addWidget(self._box, 1)
+        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Maximum)
         self.fold.toggled.connect(self._fold)
         self.ball.resized = self.refresh
         self.lobe.turned = self._turn
@@ -103,7 +105,7 @@ class MaterialStrip(QWidget):
         """What the scene and the controls ask for now."""
         materials = self._context.document.scene.materials
         material = materials.get(self.material or "")
-        if material is None or not self.fold.isChecked():
+        if material is None or not self._box.isVisible():
             return None
         other = materials.get(self.other or "") if self.other != self.material else None
         busy = self._context.editing.busy
@@ -224,6 +226,7 @@ class MaterialStrip(QWidget):
     def _arrange_again(self) -> None:
         self._columns = 0
         self._arrange()
+        self.updateGeometry()
         self.refresh()
 
     def _arrange(self) -> None:
@@ -238,9 +241,11 @@ class MaterialStrip(QWidget):
                 break
             self._columns = columns
             self._place(views, columns)
-        each = min((self.width() - GAP * (self._columns - 1)) // self._columns, _WIDEST)
-        for view in views:
-            view.setFixedHeight(max(min(each, 160), 100))
+            self.updateGeometry()
+        self._views = len(views)
+        rows = -(-self._views // self._columns)
+        room = self.height() - self._header.sizeHint().height() - GAP * rows
+        self._box.setVisible(bool(views) and self.fold.isChecked() and room >= _LOWEST * rows)
         self._arranging = False
 
     def _place(self, views: list[QWidget], columns: int) -> None:
@@ -252,7 +257,6 @@ class MaterialStrip(QWidget):
         for column in range(len(self.views)):  # plots are wider than high
             plot = column < columns and bool(views) and views[column] is not self.ball
             self._grid.setColumnStretch(column, 6 if plot else 5 if column < columns else 0)
-        self._box.setVisible(bool(views) and self.fold.isChecked())
 
     def _offer(self) -> None:
         """Materials that it can be compared with."""
@@ -274,11 +278,17 @@ class MaterialStrip(QWidget):
     def _compare(self, index: int) -> None:
         self.compare_with(self._offered[index - 1][0] if index > 0 else None)
 
+    def sizeHint(self) -> QSize:
+        """As high as views about as high as wide; with none of them, its header."""
+        found = super().sizeHint()
+        rows = -(-self._views // max(self._columns, 1)) if self.fold.isChecked() else 0
+        each = (self.width() - GAP * (self._columns - 1)) // max(self._columns, 1)
+        height = self._header.sizeHint().height() + rows * (min(max(each, 100), 150) + GAP)
+        return QSize(found.width(), height)
+
     def minimumSizeHint(self) -> QSize:
-        """One view is enough: when it becomes narrower they are laid below each other."""
-        found = super().minimumSizeHint()
-        found.setWidth(_NARROWEST)
-        return found
+        """Its header, one view wide: where there is no room for views they go."""
+        return QSize(_NARROWEST, self._header.sizeHint().height())
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         """Another number of views side by side."""

@@ -6,7 +6,7 @@ import dataclasses
 from pathlib import Path
 
 from PySide6.QtCore import QPoint, Qt, QTimer
-from PySide6.QtWidgets import QLineEdit, QMenu, QPushButton, QSplitter, QToolButton, QWidget
+from PySide6.QtWidgets import QLineEdit, QMenu, QPushButton, QSizePolicy, QSplitter, QToolButton, QWidget
 
 from studio_core.edits import AddMaterial, Compound, RemoveMaterial, SetMaterial
 from studio_core.scene.diff import Aspect, Changes
@@ -75,6 +75,8 @@ class MaterialsPanel(Panel):
         beneath = self.column_of(below)
         beneath.addWidget(self.strip)
         self.scroller(beneath).addWidget(self.editor)
+        area = beneath.itemAt(beneath.count() - 1).widget()
+        area.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Ignored)  # the strip comes first
         split = QSplitter(Qt.Orientation.Vertical)
         split.setChildrenCollapsible(False)
         split.addWidget(top)
