@@ -74,12 +74,14 @@ class Balls:
     def picture(self, material: Material, light: PreviewLight, size: int) -> Image:
         """(size, size, 4) scene-linear at the light's unit gain, alpha is coverage times opacity.
 
-        What is wrong with the material is shown as in a scene: unknown models are matte grey.
+        What is wrong with the material is shown as in a scene: unknown models are matte grey. Pictures of its
+        shape, such as of roughness, count as their mean.
         """
         if size < 8:
             raise ValueError(f"a ball of {size} pixels shows nothing")
         resolved = resolve(material, self._registry)
-        shape = np.atleast_1d(np.asarray(resolved.brdf.shape(resolved.values), np.float32))
+        typical = resolved.typical(lambda image: float(self._small(image)[..., 0].mean()))
+        shape = np.atleast_1d(np.asarray(resolved.brdf.shape(typical), np.float32))
         key = (light.key, size, resolved.brdf, shape.tobytes())
         terms = self._terms.get(key, lambda: self._sum(resolved.brdf, shape, light, size))
         at = disc(size, *_COARSE)  # whatever rings there were: pixels and their places are the same
@@ -167,9 +169,12 @@ class Balls:
             return np.asarray(resolved.brdf.coefficients(values), np.float32)
         return np.asarray(resolved.brdf.coefficients(values), np.float32)[None]
 
+    def _small(self, image: Image) -> F32:
+        return self._textures.get(image.key, lambda: _small(image))
+
     def _texels(self, texture: Texture, uv: F32) -> F32:
         """(P, 3) of the picture made small, between its texels."""
-        small = self._textures.get(texture.image.key, lambda: _small(texture.image))
+        small = self._small(texture.image)
         height, width = small.shape[:2]
         place = uv * np.array(texture.scale, np.float32) + np.array(texture.offset, np.float32)
         x, y = place[:, 0] * width - 0.5, place[:, 1] * height - 0.5

@@ -49,7 +49,7 @@ def lobe(resolved: Resolved, incidence: float, *, cosine: bool = True) -> tuple[
 
 def averaged(resolved: Resolved, mean: Callable[[Image], F64]) -> Resolved:
     """The material as it is on average over its pictures; `mean` gives a picture's linear RGB (3,)."""
-    values = dict(resolved.values)
+    values = dict(resolved.typical(lambda image: float(mean(image)[0])))
     for name, texture in resolved.textures.items():
         colour, value = mean(texture.image), values[name]
         if isinstance(value, tuple):
@@ -57,7 +57,7 @@ def averaged(resolved: Resolved, mean: Callable[[Image], F64]) -> Resolved:
             values[name] = (red, green, blue)
         else:
             values[name] = float(value) * float(colour[0])
-    return dataclasses.replace(resolved, values=values, textures={})
+    return dataclasses.replace(resolved, values=values, textures={}, shaping={})
 
 
 def albedo(resolved: Resolved, angles: npt.ArrayLike, *, quick: bool = False) -> F64:

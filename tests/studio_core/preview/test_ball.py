@@ -137,6 +137,14 @@ def test_pictures_lie_on_the_ball() -> None:
     np.testing.assert_allclose(plain[24, 14, 0] + other[24, 14, 0], 1.0, atol=0.05)
 
 
+def test_pictures_of_roughness_count_as_their_mean() -> None:
+    light = environment_light(environment(sky()))
+    half = Texture(Image(np.full((4, 4, 3), 0.5, np.float32)))
+    mapped = ball(material("ggx", roughness=0.8, textures={"roughness": half}), light, SIZE, HOST).pixels
+    plain = ball(material("ggx", roughness=0.4), light, SIZE, HOST).pixels
+    np.testing.assert_allclose(mapped, plain, rtol=1e-4, atol=1e-5)
+
+
 def test_opacity_is_in_the_alpha_and_unknown_models_are_grey() -> None:
     light = environment_light(None)
     glass = ball(material(opacity=0.25), light, SIZE, HOST).pixels
