@@ -23,6 +23,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from studio_core.brdfs.albedo import mean_albedo
 from studio_core.contract import Registry
 from studio_core.imaging.encode import encode_png
 from studio_core.imaging.transfer import linear_to_srgb
@@ -189,6 +190,4 @@ def _encoded(image: Image) -> npt.NDArray[np.uint8]:
 
 
 def _mean_colour(resolved: Resolved) -> list[float]:
-    numbers = {k: v for k, v in resolved.values.items() if not isinstance(v, str | bool)}
-    first = resolved.brdf.coefficients({k: np.asarray(v, np.float32) for k, v in numbers.items()})[0]
-    return [*_unit(first * np.pi), 1.0]
+    return [*_unit(mean_albedo(resolved.brdf, resolved.values)), 1.0]

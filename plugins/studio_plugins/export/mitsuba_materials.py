@@ -7,7 +7,7 @@ lambert        `diffuse`
 phong          `lucarne_phong` (bsdfs.py)
 blinn-phong    `lucarne_blinn_phong` (bsdfs.py)
 ggx            `roughconductor` without material where F = 1 (white metal); else `lucarne_ggx`
-any other      `diffuse` of its mean coefficients, with a note
+any other      `diffuse` of its mean albedo, with a note
 =============  =====================================================================================
 
 All are wrapped in `twosided`, and in `mask` where opacity is below 1.
@@ -24,6 +24,7 @@ from xml.etree.ElementTree import Element
 import numpy as np
 import numpy.typing as npt
 
+from studio_core.brdfs.albedo import mean_albedo
 from studio_core.contract import Registry
 from studio_core.imaging.encode import write_exr, write_png
 from studio_core.params import Value, param_infos
@@ -107,7 +108,7 @@ class Materials:
         else:
             self.notes.append(f"{material.name}: Mitsuba has no {resolved.brdf.label}; written as matte.")
             made = put(self.root, "bsdf", "diffuse", key=key)
-            rgb(made, "reflectance", np.clip(_mean_albedo(resolved), 0, 1))
+            rgb(made, "reflectance", np.clip(mean_albedo(resolved.brdf, resolved.values), 0, 1))
 
     def _parameter(self, parent: Element, name: str, resolved: Resolved, source: str) -> None:
         value, texture = resolved.values[source], resolved.textures.get(source)
@@ -163,11 +164,3 @@ def _alpha(values: Mapping[str, Value]) -> float:
 def _is_white_metal(resolved: Resolved) -> bool:
     white = resolved.values["metallic"] == 1.0 and resolved.values["base_color"] == (1.0, 1.0, 1.0)
     return white and not {"metallic", "base_color"} & set(resolved.textures)
-
-
-def _mean_albedo(resolved: Resolved) -> npt.NDArray[np.floating[Any]]:
-    """Head-on diffuse estimate of a model that Mitsuba does not know: π times its first coefficient."""
-    numbers = {k: v for k, v in resolved.values.items() if not isinstance(v, str | bool)}
-    values = {k: np.asarray(v, np.float32) for k, v in numbers.items()}
-    first: npt.NDArray[np.floating[Any]] = resolved.brdf.coefficients(values)[0] * np.pi
-    return first
