@@ -6,7 +6,6 @@ So no model has to say it, and models of other plugins are treated like our own.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -17,8 +16,24 @@ from studio_core.shading.artifacts import Shapes
 F32 = npt.NDArray[np.float32]
 
 FLAT = 1e-5  # relative variation up to which a kernel counts as constant
-_VIEWS = np.radians([0.0, 35.0, 65.0])
 _ARC = np.concatenate([[0.0], np.geomspace(1e-4, 0.999 * np.pi / 2, 160)])
+
+
+def _from(*degrees: float) -> tuple[F32, ...]:
+    return tuple(np.array([np.sin(a), 0, np.cos(a)], np.float32) for a in np.radians(degrees))
+
+
+def _hemisphere() -> F32:
+    rng = np.random.default_rng(1)
+    z = (np.arange(256) + 0.5) / 256
+    turn = 2 * np.pi * rng.random(256)
+    r = np.sqrt(1 - z * z)
+    return np.stack([r * np.cos(turn), r * np.sin(turn), z]).astype(np.float32).ravel()
+
+
+_VIEWS = _from(0.0, 35.0, 65.0)
+_AROUND = _hemisphere()
+_ALONG = np.stack([np.sin(_ARC), np.zeros_like(_ARC), np.cos(_ARC)]).astype(np.float32).ravel()
 
 
 @kernel
@@ -62,11 +77,10 @@ def probe(address: int, terms: int, shape: F32) -> Lobe:
         shape = np.zeros(1, np.float32)
     flat = True
     for view in _VIEWS:
-        values = _values(address, terms, shape, view, _hemisphere())
+        values = _values(address, terms, shape, view, _AROUND)
         spread = values.max(axis=1) - values.min(axis=1)
         flat &= bool((spread <= FLAT * np.abs(values).max(axis=1)).all())
-    along = np.stack([np.sin(_ARC), np.zeros_like(_ARC), np.cos(_ARC)], axis=1)
-    arc = _values(address, terms, shape, 0.0, along).sum(axis=0)
+    arc = _values(address, terms, shape, _VIEWS[0], _ALONG).sum(axis=0)
     if flat or not arc[0] > 0 or arc.min() >= (1 - FLAT) * arc[0]:
         return Lobe(flat, 0.0)
     below = np.flatnonzero(arc < 0.5 * (arc[0] + arc.min()))[0]
@@ -74,17 +88,9 @@ def probe(address: int, terms: int, shape: F32) -> Lobe:
     return Lobe(False, float(np.tan(_ARC[below] / 2) / np.sqrt(np.sqrt(2) - 1)))
 
 
-def _hemisphere() -> npt.NDArray[np.float64]:
-    rng = np.random.default_rng(1)
-    z = (np.arange(256) + 0.5) / 256
-    turn = 2 * np.pi * rng.random(256)
-    r = np.sqrt(1 - z * z)
-    return np.stack([r * np.cos(turn), r * np.sin(turn), z], axis=1)
-
-
-def _values(address: int, terms: int, shape: F32, view: float, directions: Any) -> npt.NDArray[np.float64]:
-    wo = np.array([np.sin(view), 0, np.cos(view)], np.float32)
-    wi = np.ascontiguousarray(np.asarray(directions, np.float32).T).ravel()
-    out = np.zeros(terms * len(directions), np.float32)
-    _evaluate(address, shape, wo, len(directions), wi, out)
+def _values(address: int, terms: int, shape: F32, wo: F32, wi: F32) -> npt.NDArray[np.float64]:
+    """(terms, N) of kernels for directions wi (3, N), flat."""
+    count = len(wi) // 3
+    out = np.zeros(terms * count, np.float32)
+    _evaluate(address, shape, wo, count, wi, out)
     return out.reshape(terms, -1).astype(np.float64)

@@ -18,10 +18,10 @@ from studio_core.scene.shading_mesh import shade_mesh
 from studio_core.scene.transform import Transform
 from studio_core.scene.world_mesh import Placed, assemble
 from studio_core.shading.artifacts import Hits, Radiance, Shapes, Surfaces
-from studio_core.shading.error_meter import surface_uvs
+from studio_core.shading.error_meter import ErrorMeter, surface_uvs
 from studio_core.shading.frame import Frame
 from studio_core.shading.job import Job
-from studio_core.shading.materials import finite_shape, resolve, same_shapes
+from studio_core.shading.materials import finite_shape, resolve, same_shapes, shapes
 from studio_core.shading.offline import backend_params, scene_view
 from studio_core.shading.pipeline import Pipeline
 from studio_core.shading.varying import MOST, Grey, ShapeTable, picture_areas, step_of, stepped
@@ -46,8 +46,8 @@ def mesh_of(edge=0.25, transform=None):
     return assemble([Placed("floor", shade_mesh(floor(2.0), edge), transform or Transform(), (0,))])
 
 
-def roughness_of(shapes, points):
-    return np.sqrt(shapes.data[shapes.offset[shapes.rows(points)]])
+def roughness_of(table, points):
+    return np.sqrt(table.data[table.offset[table.rows(points)]])
 
 
 @given(seeds)
@@ -273,3 +273,20 @@ def test_a_texture_of_the_shape_multiplies_the_value(host):
     assert resolved.values["roughness"] == 0.4
     assert resolved.typical()["roughness"] == pytest.approx(0.3)
     assert finite_shape(resolved.brdf, resolved.scaled([0.5]))[0] == pytest.approx(0.04)
+
+
+def test_a_smooth_picture_is_nearly_as_true_as_its_sharpest_roughness(host, workers, monkeypatch):
+    """The error of the picture against every pixel's own texel; with the picture's mean it is far off."""
+    v, u = np.indices((64, 64)) / 64
+    waves = 0.45 + 0.1 * np.sin(2 * np.pi * 2 * u) * np.cos(2 * np.pi * v)
+
+    def error(texture, roughness=1.0):
+        services = Services(workers, host)
+        pipeline, frame = shaded(lit(texture, roughness), host, workers, vertices=4000)
+        return ErrorMeter(services)(pipeline, frame, Job("measure"), 300).picture.relative_rmse
+
+    plain, varied = error(None, 0.35), error(Texture(picture(waves)))
+    monkeypatch.setattr(ShapeTable, "__call__", lambda _, scene, names, mesh: shapes(scene, names, host))
+    mean = error(Texture(picture(waves)))
+    assert varied < 2 * plain, (plain, varied, mean)
+    assert mean > 5 * varied, (plain, varied, mean)
