@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import secrets
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -55,7 +56,12 @@ def fit_brdf(options: argparse.Namespace, program: Headless) -> None:
     fits.sort(key=lambda one: one.difference.metric)
     values = {"file": str(options.file), "samples": len(samples), "fits": [one.report() for one in fits]}
     if options.report is not None:
-        options.report.write_text(json.dumps(values, indent=1, allow_nan=False), "utf-8")
+        beside = options.report.with_name(f".{options.report.name}.{secrets.token_hex(4)}")
+        try:
+            beside.write_text(json.dumps(values, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+            beside.replace(options.report)
+        finally:
+            beside.unlink(missing_ok=True)
     if options.out is not None:
         write(options.out, Kept(fits[0].material(name), about=f"Fitted to {options.file.name}"))
     result(options, program, values, "\n".join(map(_line, fits)))
