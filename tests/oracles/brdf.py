@@ -11,6 +11,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from oracles.facets import ggx_conductor, ggx_dielectric, plastic
+
 Array = npt.NDArray[np.float64]
 Values = Mapping[str, Any]
 
@@ -115,6 +117,9 @@ ORACLES: dict[str, Callable[[Values, Array, Array], Array]] = {
     "phong": phong,
     "blinn-phong": blinn_phong,
     "ggx": ggx,
+    "ggx-conductor": ggx_conductor,
+    "ggx-dielectric": ggx_dielectric,
+    "plastic": plastic,
 }
 
 
