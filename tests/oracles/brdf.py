@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-
 from oracles.facets import ggx_conductor, ggx_dielectric, plastic
 
 Array = npt.NDArray[np.float64]

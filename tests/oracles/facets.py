@@ -19,6 +19,10 @@ from studio_plugins.brdfs.facets import bounce
 Array = npt.NDArray[np.float64]
 Values = Mapping[str, Any]
 
+_X, _W = np.polynomial.legendre.leggauss(100)
+_C = (_X + 1) / 2
+_U = np.linspace(0, 1, 20001)[1:-1]
+
 
 def fresnel(c: Array, index: float) -> Array:
     """Mean of both polarisations' reflectances, from Snell's law."""
@@ -44,15 +48,13 @@ class Table:
         bounces, reflected = bounce(mu, alpha, index)
         self._bounce = CubicSpline(place, bounces)
         self._reflected = CubicSpline(place, reflected)
-        x, w = np.polynomial.legendre.leggauss(200)
-        u = top * (x + 1) / 2
+        u = top * _C
         mu = 0.3 * alpha * np.expm1(u)
-        weight = w * top / 2 * 0.3 * alpha * np.exp(u) * 2 * mu
+        weight = _W * top / 2 * 0.3 * alpha * np.exp(u) * 2 * mu
         self.missing = float((weight * (1 - self._bounce(u))).sum())  # 1 − Ē
         self.survives = 1.0
         if index is not None:
-            c = (x + 1) / 2
-            mean = float((w * c * fresnel(c, index)).sum())
+            mean = float((_W * _C * fresnel(_C, index)).sum())
             self.survives = mean**2 * (1 - self.missing) / (1 - mean * self.missing)
         self.through = float((weight * self.transmitted(mu)).sum())
 
@@ -107,9 +109,7 @@ def plastic(values: Values, wo: Array, wi: Array) -> Array:
     known = table(alpha, index)
     skin = lobe * fresnel(oh, index) + known.survives * known.multiple(no, ni)
     ground = known.transmitted(no) * known.transmitted(ni) / (np.pi * known.through)
-    x, w = np.polynomial.legendre.leggauss(200)
-    c = (x + 1) / 2
-    inside = 1 - (1 - (w * c * fresnel(c, index)).sum()) / index**2
+    inside = 1 - (1 - (_W * _C * fresnel(_C, index)).sum()) / index**2
     rho, f = np.asarray(values["base_color"], np.float64), inside * float(values["depth"])
     colour = rho * (1 - f) / (1 - rho * f)
     return above[..., None] * (float(values["gloss"]) * skin[..., None] + ground[..., None] * colour)
@@ -119,16 +119,14 @@ def ggx_conductor(values: Values, wo: Array, wi: Array) -> Array:
     """(..., 3) f_r of `ggx-conductor`."""
     above, no, ni, oh, lobe, alpha = _facets(values, wo, wi)
     f0, edge = (np.asarray(values[name], np.float64) for name in ("base_color", "edge_tint"))
-    u = np.linspace(0, 1, 20001)[1:-1]
     schlick = f0 + (1 - f0) * (6 / 7) ** 5
     a = schlick * (1 - edge) / ((1 / 7) * (6 / 7) ** 6)
-    highest = np.array([((f + (1 - f) * (1 - u) ** 5) / (u * (1 - u) ** 6)).min() for f in np.ravel(f0)])
+    highest = np.array([((f + (1 - f) * (1 - _U) ** 5) / (_U * (1 - _U) ** 6)).min() for f in np.ravel(f0)])
     a = np.minimum(a, 0.95 * highest.reshape(np.shape(f0)))
     oh = oh[..., None]
     f = f0 + (1 - f0) * (1 - oh) ** 5 - a * oh * (1 - oh) ** 6
-    x, w = np.polynomial.legendre.leggauss(20)
-    c = ((x + 1) / 2)[:, None]
-    mean = (w[:, None] * c * (f0 + (1 - f0) * (1 - c) ** 5 - a * c * (1 - c) ** 6)).sum(0)
+    c = _C[:, None]
+    mean = (_W[:, None] * c * (f0 + (1 - f0) * (1 - c) ** 5 - a * c * (1 - c) ** 6)).sum(0)
     known = table(alpha)
     survives = mean**2 * (1 - known.missing) / (1 - mean * known.missing)
     return above[..., None] * (lobe[..., None] * f + known.multiple(no, ni)[..., None] * survives)

@@ -86,7 +86,8 @@ def mean_fresnel(index: npt.ArrayLike) -> F64:
     made: F64 = 0.5 + (n - 1) * (3 * n + 1) / (6 * (n + 1) ** 2)
     made = made + n**2 * (n**2 - 1) ** 2 / (n**2 + 1) ** 3 * np.log((n - 1) / (n + 1))
     made = made - 2 * n**3 * (n**2 + 2 * n - 1) / ((n**2 + 1) * (n**4 - 1))
-    return made + 8 * n**4 * (n**4 + 1) / ((n**2 + 1) * (n**4 - 1) ** 2) * np.log(n)
+    made += 8 * n**4 * (n**4 + 1) / ((n**2 + 1) * (n**4 - 1) ** 2) * np.log(n)
+    return made
 
 
 def surviving(mean: Any, average: Any) -> Any:
@@ -151,16 +152,22 @@ def lost(cosine: np.float32, c: Any) -> np.float32:
 
 
 AVERAGE: F64 = np.array(
-    [0.8794570335, -0.357335352, -0.2871309249, 0.053618633, 0.1243212107, -0.0051732239, -0.0368036189]
-    + [-0.0045121381, 0.0131128288, 0.0009737382, -0.0057391502, 0.0007465328, 0.0010996790]
+    [
+        *(0.8794570335, -0.357335352, -0.2871309249, 0.053618633, 0.1243212107, -0.0051732239, -0.0368036189),
+        *(-0.0045121381, 0.0131128288, 0.0009737382, -0.0057391502, 0.0007465328, 0.001099679),
+    ]
 )
 """Ē as a polynomial of the roughness from the constant up; `fitted_average` makes it again."""
+
+
+def _missed(alpha: float, mu: F64) -> F64:
+    return 1 - bounce(mu, alpha)[0]
 
 
 def fitted_average() -> F64:
     """(13,) the polynomial through Ē at 33 roughnesses, in powers of 2 · roughness − 1."""
     x = np.cos((np.arange(33) + 0.5) * np.pi / 33)
-    values = [1 - hemispherical(lambda mu, a=a: 1 - bounce(mu, a)[0], a) for a in map(alpha_of, (x + 1) / 2)]
+    values = [1 - hemispherical(functools.partial(_missed, a), a) for a in map(alpha_of, (x + 1) / 2)]
     return np.asarray(np.polynomial.chebyshev.cheb2poly(np.polynomial.chebyshev.chebfit(x, values, 12)))
 
 

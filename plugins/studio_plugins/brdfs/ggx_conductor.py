@@ -5,7 +5,8 @@ eqs. 33, 34; separable), α = roughness², and f_ms and F_ms by Kulla & Conty (2
 F(u) = F0 + (1 − F0)(1 − u)^5 − a u (1 − u)^6: Schlick's curve with the dip that real metals have before
 grazing (Lazányi & Szirmay-Kalos 2005), set by the colour at 82° as a share of Schlick's (Kutz, Hašan &
 Edmondson, "Novel aspects of the Adobe Standard Material", 2021):
-a = (F0 + (1 − F0)(6/7)^5) (1 − edge) · 7 (7/6)^6, but never so large that F would fall below a twentieth of Schlick's.
+a = (F0 + (1 − F0)(6/7)^5) (1 − edge) · 7 (7/6)^6, but never so large that F would fall
+below a twentieth of Schlick's.
 
 Terms: b0 = DG/(4…)(1 − (1 − u)^5), b1 = DG/(4…)(1 − u)^5, b2 = DG/(4…) u (1 − u)^6, b3 = f_ms;
 c0 = F0, c1 = 1, c2 = −a, c3 = F_ms with F̄ = F0 + (1 − F0)/21 − a/126.

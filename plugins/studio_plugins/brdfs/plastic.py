@@ -7,7 +7,8 @@ f_r = gloss · f_skin + T(θ_i) T(θ_o) / (π T̄) · ρ (1 − F) / (1 − ρ F
 
 (Wolff 1994's inside reflections as a closed sum, with Kulla & Conty's (2017) reciprocal coupling through
 albedos; T̄ = 2 ∫ T μ dμ). It is reciprocal and returns all light where the ground is white. F, what is thrown
-down from inside, is `depth` · (1 − (1 − F̄) / index²), F̄ the mean reflection from outside: for index 1.5, 0.60.
+down from inside, is `depth` · (1 − (1 − F̄) / index²), F̄ the mean reflection from outside:
+0.60 for the index 1.5.
 Terms: b0 = f_skin, b1 = T T / (π T̄); c0 = gloss, c1 = ρ (1 − F) / (1 − ρ F).
 
 =============  ========  =====  ============================================================

