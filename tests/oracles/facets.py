@@ -122,7 +122,7 @@ def ggx_conductor(values: Values, wo: Array, wi: Array) -> Array:
     schlick = f0 + (1 - f0) * (6 / 7) ** 5
     a = schlick * (1 - edge) / ((1 / 7) * (6 / 7) ** 6)
     highest = np.array([((f + (1 - f) * (1 - _U) ** 5) / (_U * (1 - _U) ** 6)).min() for f in np.ravel(f0)])
-    a = np.minimum(a, 0.95 * highest.reshape(np.shape(f0)))
+    a = np.minimum(a, 0.9 * highest.reshape(np.shape(f0)))
     oh = oh[..., None]
     f = f0 + (1 - f0) * (1 - oh) ** 5 - a * oh * (1 - oh) ** 6
     c = _C[:, None]

@@ -29,6 +29,7 @@ LEAST_ALPHA = 1e-4
 LEAST_MU = 1e-3  # below, what the sharpest facets let through is continued: at 89.94°
 KEPT = 512
 _NODES, _WEIGHTS = (np.asarray(a) for a in np.polynomial.legendre.leggauss(32))
+_FINE_NODES, _FINE_WEIGHTS = (np.asarray(a) for a in np.polynomial.legendre.leggauss(96))
 _HALF_NODES, _HALF_WEIGHTS = (np.asarray(a) for a in np.polynomial.legendre.leggauss(16))
 
 
@@ -97,11 +98,10 @@ def surviving(mean: Any, average: Any) -> Any:
 
 def hemispherical(values: Any, alpha: float) -> float:
     """2 ∫ f(μ) μ dμ of a function of cosines (N,) that may change within α of grazing."""
-    x, w = np.polynomial.legendre.leggauss(96)
     grade = np.log(1 / alpha) + 4
-    mu = np.expm1(grade * (x + 1) / 2) / np.expm1(grade)
-    stretch = grade * np.exp(grade * (x + 1) / 2) / np.expm1(grade)
-    return float((w * stretch * mu * values(mu)).sum())
+    mu = np.expm1(grade * (_FINE_NODES + 1) / 2) / np.expm1(grade)
+    stretch = grade * np.exp(grade * (_FINE_NODES + 1) / 2) / np.expm1(grade)
+    return float((_FINE_WEIGHTS * stretch * mu * values(mu)).sum())
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ F(u) = F0 + (1 − F0)(1 − u)^5 − a u (1 − u)^6: Schlick's curve with the 
 grazing (Lazányi & Szirmay-Kalos 2005), set by the colour at 82° as a share of Schlick's (Kutz, Hašan &
 Edmondson, "Novel aspects of the Adobe Standard Material", 2021):
 a = (F0 + (1 − F0)(6/7)^5) (1 − edge) · 7 (7/6)^6, but never so large that F would fall
-below a twentieth of Schlick's.
+below a tenth of Schlick's.
 
 Terms: b0 = DG/(4…)(1 − (1 − u)^5), b1 = DG/(4…)(1 − u)^5, b2 = DG/(4…) u (1 − u)^6, b3 = f_ms;
 c0 = F0, c1 = 1, c2 = −a, c3 = F_ms with F̄ = F0 + (1 − F0)/21 − a/126.
@@ -48,9 +48,9 @@ from studio_plugins.brdfs.ggx_dielectric import roughness
 
 _EDGE = 7 * (7 / 6) ** 6  # 1 / (u (1 − u)^6) at u = 1/7, where that is largest
 _U = (np.arange(2000) + 0.5) / 2000
-_F0 = np.linspace(0.0, 1.0, 257)
+_F0 = np.linspace(0.0, 1.0, 257) ** 3  # dense where the deepest dip bends
 _LOWEST = (1 - _U) ** 5, _U * (1 - _U) ** 6
-_DEEPEST = 0.95 * np.array([((f + (1 - f) * _LOWEST[0]) / _LOWEST[1]).min() for f in _F0])
+_DEEPEST = 0.9 * np.array([((f + (1 - f) * _LOWEST[0]) / _LOWEST[1]).min() for f in _F0])
 
 
 @dataclass(frozen=True)

@@ -59,6 +59,7 @@ def at(info: ParamInfo, fraction: float) -> Any:
     return (value, value, value) if info.kind == "colour" else value
 
 
+@functools.cache
 def split(model: Any) -> tuple[list[str], list[str]]:
     """Names of the parameters that change the shape, and of the others."""
     infos, start = param_infos(model.Params), defaults(model.Params)
@@ -149,8 +150,8 @@ def test_albedo_is_the_float64_tables(model: Any) -> None:
     oracle = ORACLES[model.id]
     for s, fraction in enumerate(fractions):
 
-        def f(row: int, wi: Float, fraction: float = fraction) -> Any:
-            values = [{**shaped(model, fraction), **corner} for corner in corners]
+        def f(row: int, wi: Float, around: dict[str, Any] = shaped(model, fraction)) -> Any:  # noqa: B008
+            values = [{**around, **corner} for corner in corners]
             w = unit(wi)
             o = np.broadcast_to(wo[row], w.shape)
             return np.concatenate([oracle(grey(v), o, w) for v in values], -1) * w[:, 2:]
