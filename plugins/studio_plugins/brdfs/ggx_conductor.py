@@ -31,9 +31,11 @@ import numpy.typing as npt
 
 from studio_core.jit import batch_function
 from studio_core.kernels.brdf import (
+    DENSITY_SIGNATURE,
     HALF,
     LEAST_HEIGHT,
     ONE,
+    SAMPLE_SIGNATURE,
     SIGNATURE,
     ZERO,
     carray,
@@ -41,6 +43,7 @@ from studio_core.kernels.brdf import (
     schlick_weight,
     smith_factor,
 )
+from studio_core.kernels.lobes import draw_bounced, draw_visible, weigh_bounced, weigh_visible
 from studio_core.params import Colour, Value, param
 from studio_plugins.brdfs.curves import taken
 from studio_plugins.brdfs.facets import alpha_of, average_bounce, lost, missing, surviving
@@ -93,6 +96,27 @@ def evaluate(shape: Any, wo: Any, count: int, wi: Any, out: Any) -> None:
         b3[k] = lit * back * lost(down, missed)
 
 
+@batch_function(SAMPLE_SIGNATURE)
+def sample(shape: Any, wo: Any, term: int, count: int, u: Any, wi: Any) -> None:
+    """By visible normals, and what bounced by itself; see `studio_core.contract.SampledBrdf`."""
+    o, numbers, directions = carray(wo, 3), carray(u, 2 * count), carray(wi, 3 * count)
+    alpha = carray(shape, 1)[0]
+    if term == 3:
+        draw_bounced(o, alpha, numbers, directions)
+    else:
+        draw_visible(o, alpha, alpha, numbers, directions)
+
+
+@batch_function(DENSITY_SIGNATURE)
+def density(shape: Any, wo: Any, count: int, wi: Any, out: Any) -> None:
+    """G1 D / (4 n·ω_o) three times, and that of `draw_bounced`; see `studio_core.contract.SampledBrdf`."""
+    o, directions, terms = carray(wo, 3), carray(wi, 3 * count), carray(out, 4 * count)
+    alpha = carray(shape, 1)[0]
+    for term in range(3):
+        weigh_visible(o, alpha, directions, terms[term * count : (term + 1) * count])
+    weigh_bounced(o, alpha, directions, terms[3 * count :])
+
+
 class GgxConductor:
     """See the module; satisfies `studio_core.contract.Brdf`."""
 
@@ -106,6 +130,16 @@ class GgxConductor:
     def address(self) -> int:
         """Address of `evaluate`."""
         return evaluate.address
+
+    @property
+    def sampler(self) -> int:
+        """Address of `sample`."""
+        return sample.address
+
+    @property
+    def density(self) -> int:
+        """Address of `density`."""
+        return density.address
 
     def shape(self, values: Mapping[str, Value]) -> npt.NDArray[np.float32]:
         """(18,): α, 1 / (π (1 − Ē)), and the curve of 1 − E."""

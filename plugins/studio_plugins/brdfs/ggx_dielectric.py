@@ -26,9 +26,11 @@ import numpy.typing as npt
 
 from studio_core.jit import batch_function
 from studio_core.kernels.brdf import (
+    DENSITY_SIGNATURE,
     HALF,
     LEAST_HEIGHT,
     ONE,
+    SAMPLE_SIGNATURE,
     SIGNATURE,
     ZERO,
     carray,
@@ -36,6 +38,7 @@ from studio_core.kernels.brdf import (
     ggx_distribution,
     smith_factor,
 )
+from studio_core.kernels.lobes import draw_skin, weigh_skin
 from studio_core.params import Colour, Value, param
 from studio_plugins.brdfs.curves import taken
 from studio_plugins.brdfs.facets import alpha_of, lost, mean_fresnel, missing, surviving
@@ -92,6 +95,20 @@ def skin(values: Mapping[str, Value]) -> tuple[float, float, npt.NDArray[np.floa
     return alpha, index, np.array([alpha, index * index, share, *gap.curve], np.float32)
 
 
+@batch_function(SAMPLE_SIGNATURE)
+def sample(shape: Any, wo: Any, term: int, count: int, u: Any, wi: Any) -> None:
+    """By visible normals, in part as what bounced; see `studio_core.contract.SampledBrdf`."""
+    o, numbers, directions = carray(wo, 3), carray(u, 2 * count), carray(wi, 3 * count)
+    draw_skin(o, carray(shape, 1)[0], numbers, directions)
+
+
+@batch_function(DENSITY_SIGNATURE)
+def density(shape: Any, wo: Any, count: int, wi: Any, out: Any) -> None:
+    """That of `draw_skin`; see `studio_core.contract.SampledBrdf`."""
+    o, directions, terms = carray(wo, 3), carray(wi, 3 * count), carray(out, 1 * count)
+    weigh_skin(o, carray(shape, 1)[0], directions, terms)
+
+
 class GgxDielectric:
     """See the module; satisfies `studio_core.contract.Brdf`."""
 
@@ -105,6 +122,16 @@ class GgxDielectric:
     def address(self) -> int:
         """Address of `evaluate`."""
         return evaluate.address
+
+    @property
+    def sampler(self) -> int:
+        """Address of `sample`."""
+        return sample.address
+
+    @property
+    def density(self) -> int:
+        """Address of `density`."""
+        return density.address
 
     def shape(self, values: Mapping[str, Value]) -> npt.NDArray[np.float32]:
         """(19,): see `skin`."""

@@ -33,9 +33,11 @@ import numpy.typing as npt
 
 from studio_core.jit import batch_function, kernel
 from studio_core.kernels.brdf import (
+    DENSITY_SIGNATURE,
     HALF,
     LEAST_HEIGHT,
     ONE,
+    SAMPLE_SIGNATURE,
     SIGNATURE,
     ZERO,
     carray,
@@ -43,6 +45,7 @@ from studio_core.kernels.brdf import (
     ggx_distribution,
     smith_factor,
 )
+from studio_core.kernels.lobes import draw_cosine, draw_skin, weigh_cosine, weigh_skin
 from studio_core.params import Colour, Value, param
 from studio_plugins.brdfs.curves import at, curve, place, taken
 from studio_plugins.brdfs.facets import hemispherical, left_out, lost, mean_fresnel, mean_passage
@@ -101,6 +104,24 @@ def evaluate(shape: Any, wo: Any, count: int, wi: Any, out: Any) -> None:
         b1[k] = lit * through * _let_through(missing, down, survives, mean)
 
 
+@batch_function(SAMPLE_SIGNATURE)
+def sample(shape: Any, wo: Any, term: int, count: int, u: Any, wi: Any) -> None:
+    """The skin as `ggx-dielectric`, the ground by the cosine; see `studio_core.contract.SampledBrdf`."""
+    o, numbers, directions = carray(wo, 3), carray(u, 2 * count), carray(wi, 3 * count)
+    if term == 0:
+        draw_skin(o, carray(shape, 1)[0], numbers, directions)
+    else:
+        draw_cosine(o, numbers, directions)
+
+
+@batch_function(DENSITY_SIGNATURE)
+def density(shape: Any, wo: Any, count: int, wi: Any, out: Any) -> None:
+    """That of `draw_skin`, and cos θ / π; see `studio_core.contract.SampledBrdf`."""
+    o, directions, terms = carray(wo, 3), carray(wi, 3 * count), carray(out, 2 * count)
+    weigh_skin(o, carray(shape, 1)[0], directions, terms[:count])
+    weigh_cosine(o, directions, terms[count:])
+
+
 class Plastic:
     """See the module; satisfies `studio_core.contract.Brdf`."""
 
@@ -114,6 +135,16 @@ class Plastic:
     def address(self) -> int:
         """Address of `evaluate`."""
         return evaluate.address
+
+    @property
+    def sampler(self) -> int:
+        """Address of `sample`."""
+        return sample.address
+
+    @property
+    def density(self) -> int:
+        """Address of `density`."""
+        return density.address
 
     def shape(self, values: Mapping[str, Value]) -> npt.NDArray[np.float32]:
         """(37,): what describes the skin, F_ms, 1 / (π T̄), and the curve of what facets let through."""

@@ -22,7 +22,11 @@ from studio_core.params import defaults
 
 SAMPLED = {name: model for name, model in MODELS.items() if is_sampled(model)}
 every_model = pytest.mark.parametrize("model", SAMPLED.values(), ids=SAMPLED.keys())
-DRAWING = ("lambert", "oren-nayar", "phong", "blinn-phong", "ggx", "measured")
+DRAWING = ("lambert", "oren-nayar", "phong", "blinn-phong", "ggx", "measured") + (
+    "ggx-conductor",
+    "ggx-dielectric",
+    "plastic",
+)
 FRACTIONS = (0.0, 0.35, 1.0)
 ANGLES = np.radians([0.5, 50, 80, 89])
 MOST = 16.0  # times what a perfect draw would weigh
