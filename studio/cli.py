@@ -15,7 +15,7 @@ from studio_core.errors import InputError, LucarneError
 
 VERBS = (
     *("demo", "new", "info", "copy", "compact", "render", "frames", "radiance", "precompute", "export"),
-    *("capture", "fit-brdf", "script", "bench", "stress", "doctor"),
+    *("capture", "fit-brdf", "fit-material", "script", "bench", "stress", "doctor"),
 )
 BAD_INPUT, OUR_FAULT, INTERRUPTED, NOBODY_READS = 2, 70, 130, 141
 TRACEBACK = "LUCARNE_TRACEBACK"
@@ -143,6 +143,10 @@ def _run(options: argparse.Namespace) -> int:
                 from studio.verbs_materials import fit_brdf
 
                 return fit_brdf(options, program) or 0
+            if options.verb == "fit-material":
+                from studio.verbs_captured import fit_material
+
+                return fit_material(options, program) or 0
             if options.verb == "capture":
                 from studio.verbs_capture import capture
 
@@ -286,12 +290,14 @@ def parser() -> argparse.ArgumentParser:
     export.add_argument("project", type=Path, metavar="PROJECT")
     export.add_argument("-o", "--out", type=Path, required=True, metavar="(OUT.glb|DIR)")
 
-    from studio import capture_options, verbs_materials
+    from studio import capture_options, verbs_captured, verbs_materials
 
     text = "a room's light from photographs of it, taken at several exposures"
     capture_options.add_options(verb("capture", text))
     text = "the values with which reflectance models come nearest to a measured material"
     verbs_materials.add_options(verb("fit-brdf", text))
+    text = "a material from photographs of a ball of it under known lights"
+    verbs_captured.add_options(verb("fit-material", text))
 
     script = verb("script", "run a Python file with the names of the console", json=False)
     text = "what the script's names mean; saved where it says save()"
