@@ -20,6 +20,9 @@ from scenes import little_scene
 import studio.display
 import studio.verbs
 import studio.verbs_pictures
+from studio.bench.lab import Rig, row, shoot
+from studio.bench.lab_files import write_shots
+from studio.bench.lab_surfaces import library
 from studio.bench.phone_files import write_photograph
 from studio.cli import BAD_INPUT, INTERRUPTED, NOBODY_READS, OUR_FAULT, VERBS, main, parser
 from studio_core.errors import LucarneError
@@ -30,6 +33,7 @@ from studio_core.imaging.photograph import Photograph, ShotFacts
 from studio_core.project.lock import acquire
 from studio_core.project.recovery import RecoveryFile, recovery_path
 from studio_core.project.store import load, save
+from studio_plugins.residual.samples import Ball
 
 ROOT = Path(__file__).resolve().parents[2]
 QUICK = ("--param", "directions=1024", "--param", "vertices=500")
@@ -420,8 +424,12 @@ def test_no_verb_without_a_window_loads_qt(files: Path) -> None:
         ["precompute", "made.lucarne", *QUICK],
         ["capture", "--equirect", "all.jpg", "-o", "light.exr", "--set", "stitch.width=64"],
         ["fit-brdf", "chalk.csv", "--model", "lambert", "-o", "chalk.lucmat"],
+        ["fit-material", "ball", "--size", "8", "--no-refine", "--basis", "albedo"],
         ["doctor"],
     ]
+    (files / "ball").mkdir()
+    small = Rig(size=(64, 64), ball=Ball(32, 32, 20), samples=1)
+    write_shots(shoot(library()["textured"], row(), small), files / "ball")
     rows = "".join(f"{i},{o},{p},0.1,0.1,0.1\n" for i in (0, 40) for o in (10, 50) for p in (0, 90, 180))
     (files / "chalk.csv").write_text("theta_i,theta_o,phi,R,G,B\n" + rows)
     assert {command[0] for command in commands} | {"bench", "stress"} == set(VERBS)

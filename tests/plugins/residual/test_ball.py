@@ -47,6 +47,13 @@ def test_a_noisy_ball_is_found_to_a_tenth_of_a_pixel(material: str, ball: Ball) 
     assert abs(found.ball.radius - ball.radius) < 0.15
 
 
+def test_a_ball_that_fills_the_picture_is_found() -> None:
+    ball = Ball(60.4, 58.7, 56.0)
+    shots = shoot(library()["textured"], row().some([0, 4, 8, 11]), Rig(size=(121, 118), ball=ball), 3)
+    found = find_ball(shots.pictures).ball
+    assert abs(found.x - ball.x) + abs(found.y - ball.y) + abs(found.radius - ball.radius) < 0.3
+
+
 @pytest.mark.parametrize("what", ["nothing", "a corner", "a square"])
 def test_no_ball_is_no_ball(what: str) -> None:
     pictures = np.zeros((1, 90, 120, 3), np.float32)
