@@ -17,6 +17,7 @@ plugin = Plugin(
             "ggx-conductor": f"{_HERE}.ggx_conductor:MODEL",
             "ggx-dielectric": f"{_HERE}.ggx_dielectric:MODEL",
             "plastic": f"{_HERE}.plastic:MODEL",
+            "ward": f"{_HERE}.ward:MODEL",
             "measured": f"{_HERE}.measured:MODEL",
         },
         "importer": {
