@@ -21,6 +21,7 @@ F64 = npt.NDArray[np.float64]
 
 ALONG, AROUND = 24, 16
 LEAST_EXPECTED = 10.0
+PRECISE = 0.03  # directions a box; layers along the horizon may be as thin as 1e-4
 
 
 @dataclass(frozen=True)
@@ -48,7 +49,7 @@ def chi_square(
         return density(brdf, shape, direction, at)[:, term : term + 1]
 
     rows = np.zeros(len(low), np.int64)
-    inside = over_boxes(integrand, direction, rows, low, size, 0.3 / count)[:, 0]
+    inside = over_boxes(integrand, direction, rows, low, size, PRECISE / count)[:, 0]
     s, phi = MirrorFrame.of(direction).place(0, wi)
     box = np.minimum(s * ALONG, ALONG - 1).astype(np.int64) * AROUND
     box += np.minimum(phi / (2 * np.pi) * AROUND, AROUND - 1).astype(np.int64)

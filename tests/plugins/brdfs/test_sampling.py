@@ -22,11 +22,8 @@ from studio_core.params import defaults
 
 SAMPLED = {name: model for name, model in MODELS.items() if is_sampled(model)}
 every_model = pytest.mark.parametrize("model", SAMPLED.values(), ids=SAMPLED.keys())
-DRAWING = ("lambert", "oren-nayar", "phong", "blinn-phong", "ggx", "measured") + (
-    "ggx-conductor",
-    "ggx-dielectric",
-    "plastic",
-)
+GGX = ("ggx", "ggx-conductor", "ggx-dielectric", "plastic")
+DRAWING = ("lambert", "oren-nayar", "phong", "blinn-phong", "measured", *GGX)
 FRACTIONS = (0.0, 0.35, 1.0)
 ANGLES = np.radians([0.5, 50, 80, 89])
 MOST = 16.0  # times what a perfect draw would weigh
@@ -73,7 +70,7 @@ def test_draws_as_often_as_it_says(model: Any) -> None:
                 seed = zlib.crc32(f"{model.id} {list(shape[:8])} {number_of} {term}".encode())
                 found = chi_square(model, shape, wo, term, 20_000, seed)
                 made[(term, round(float(np.degrees(ANGLES[number_of]))), tuple(shape[:4]))] = found
-                assert 0 < found.expected < 1.02  # thin layers along the horizon count so well
+                assert 0 < found.expected < 1.005
                 assert found.freedom >= 5
     worst = min(made, key=lambda at: made[at].p)
     print(f"{model.id}: least p of {len(made)} is {made[worst].p:.3g}, {worst}: {made[worst]}")
