@@ -49,6 +49,7 @@ _MEAN = 2 / 3 - 28 / (15 * np.pi)
 _GRAZING = np.float32(_FALL)  # where G / π ends, so that E ends at 1
 _TWO_THIRDS = np.float32(2 / 3)
 _LEAST = np.float32(1e-30)
+_LEAST_SHARE = np.float32(1e-6)  # what is less has no inverse to count with
 
 
 @dataclass(frozen=True)
@@ -99,7 +100,8 @@ def evaluate(shape: Any, wo: Any, count: int, wi: Any, out: Any) -> None:
 @kernel
 def _even_share(r: np.float32, up: np.float32) -> np.float32:
     """Of the draws of b0, which is bright at grazing angles: b0 cosθ_i ≤ A (1 + r) / π, not less there."""
-    return HALF * r * max(ONE - up, ZERO)
+    share = HALF * r * max(ONE - up, ZERO)
+    return share if share > _LEAST_SHARE else ZERO
 
 
 @batch_function(SAMPLE_SIGNATURE)

@@ -32,7 +32,7 @@ EDGES = [(a, b) for a in (0, 1e-30, 1e-7, 0.5, 1 - 2**-24) for b in (0, 0.25, 0.
 component = st.one_of(
     st.sampled_from([0.0, 1e-45, 1e-38, 1e-20, 1e-7, 1e-4, 1.0]), st.floats(-1, 1, width=32)
 )
-fraction = st.one_of(st.sampled_from([0.0, 1.0]), st.floats(0, 1))
+fraction = st.one_of(st.sampled_from([0.0, 1e-38, 1e-7, 1.0]), st.floats(0, 1))
 number = st.one_of(st.sampled_from([0.0, 1e-30, 0.5, 1 - 2**-24]), st.floats(0, 1 - 2**-24, width=32))
 
 
