@@ -30,7 +30,7 @@ KEPT = 256
 
 
 def albedo_table(brdf: Brdf, values: Mapping[str, Value], angles: npt.ArrayLike, azimuth: float = 0.0) -> F64:
-    """(A, 3) directional albedo at angles (A,) from the normal, in radians, within 0.1 % up to 89°.
+    """(A, 3) directional albedo at angles (A,) from the normal, in radians, within 0.2 % up to 89°.
 
     Angles beyond 89.9° are taken as that: at 90° nothing is seen. `azimuth` in radians from the tangent
     tells for anisotropic models.

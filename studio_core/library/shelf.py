@@ -48,7 +48,7 @@ class Shelf:
 
     def __init__(self, folder: Path, built_in: Iterable[Kept] = ()) -> None:
         self.folder = folder
-        self._built_in = tuple(Entry(kept) for kept in built_in)
+        self.built_in = tuple(Entry(kept) for kept in built_in)
         self._known: dict[Path, Entry] = {}
 
     def entries(self) -> tuple[Entry, ...]:
@@ -63,7 +63,7 @@ class Shelf:
             before = self._known.get(path)
             known[path] = before if before is not None and before.stamp == stamp else _entry(path, stamp)
         self._known = known
-        return (*self._built_in, *known.values())
+        return (*self.built_in, *known.values())
 
     def find(self, text: str = "", tags: Iterable[str] = ()) -> tuple[Entry, ...]:
         """Entries with all of the tags, and with words that begin with each word of `text`."""

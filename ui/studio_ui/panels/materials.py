@@ -9,6 +9,7 @@ from PySide6.QtCore import QPoint, Qt, QTimer
 from PySide6.QtWidgets import QLineEdit, QMenu, QPushButton, QSizePolicy, QSplitter, QToolButton, QWidget
 
 from studio_core.edits import AddMaterial, Compound, RemoveMaterial, SetMaterial
+from studio_core.library.lucmat import Kept
 from studio_core.scene.diff import Aspect, Changes
 from studio_core.scene.nodes import Material, MaterialId, MeshObject, Scene, new_id
 from studio_ui.context import Context
@@ -23,6 +24,7 @@ from studio_ui.objects.material_drag import assigned
 from studio_ui.panels.material_form import MaterialForm
 from studio_ui.panels.material_list import MaterialList, users_of
 from studio_ui.panels.panel import Panel, row
+from studio_ui.panels.shelf_menu import ShelfMenu
 from studio_ui.panels.swatch import SIZE
 
 _WHAT_CHANGES_USERS = Aspect.STRUCTURE | Aspect.MATERIAL
@@ -56,7 +58,9 @@ class MaterialsPanel(Panel):
         add = self.tool("add", "New material")
         copy = self.tool("duplicate", "Duplicate the chosen material")
         self.users = self.tool("select", "Choose the objects that have the chosen materials")
-        add.clicked.connect(self.add)
+        self.shelf = ShelfMenu(context, self.add, self.take)
+        add.setMenu(self.shelf)
+        add.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
         copy.clicked.connect(self.copy)
         self.users.clicked.connect(self.select_users)
         self.assign = QPushButton("Assign")
@@ -216,6 +220,17 @@ class MaterialsPanel(Panel):
         if self.context.editing.apply(AddMaterial(made)):
             self.choose(made.id)
 
+    def take(self, kept: Kept) -> None:
+        """A material of the shelf."""
+        made = dataclasses.replace(kept.material, id=new_id("material"), name=self._free_name(kept.name))
+        if self.context.editing.apply(AddMaterial(made, f"Add {made.name}")):
+            self.choose(made.id)
+
+    def keep(self) -> None:
+        """Put the chosen ones on the shelf."""
+        for material in self.chosen:
+            self.shelf.keep(self.context.document.scene.material(material))
+
     def copy(self) -> None:
         """A copy of the chosen one."""
         if self.material is None:
@@ -278,6 +293,7 @@ class MaterialsPanel(Panel):
             assign = menu.addAction("Assign to what is chosen", self.assign_to_selection)
             assign.setEnabled(self.assign.isEnabled())
             menu.addAction("Select objects that have it", self.select_users)
+            menu.addAction("Keep for all projects", self.keep)
             menu.addSeparator()
             menu.addAction("Delete", self.remove)
         menu.addAction("Delete all that no object has", self.remove_unused)
