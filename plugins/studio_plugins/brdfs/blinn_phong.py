@@ -41,6 +41,7 @@ from studio_core.kernels.brdf import (
 )
 from studio_core.kernels.lobes import draw_cosine, draw_half_power, weigh_cosine, weigh_half_power
 from studio_core.params import Value
+from studio_plugins.brdfs.functions import Functions
 from studio_plugins.brdfs.two_lobes import TwoLobeParams, TwoLobes, exponent, sharpness
 
 
@@ -89,27 +90,13 @@ def density(shape: Any, wo: Any, count: int, wi: Any, out: Any) -> None:
     weigh_half_power(o, carray(shape, 2)[0] + ONE, directions, terms[count:])
 
 
-class BlinnPhong(TwoLobes):
+class BlinnPhong(Functions, TwoLobes):
     """See the module; satisfies `studio_core.contract.Brdf`."""
 
     id = "blinn-phong"
     label = "Blinn–Phong"
     Params = Params
-
-    @property
-    def address(self) -> int:
-        """Address of `evaluate`."""
-        return evaluate.address
-
-    @property
-    def sampler(self) -> int:
-        """Address of `sample`."""
-        return sample.address
-
-    @property
-    def density(self) -> int:
-        """Address of `density`."""
-        return density.address
+    functions = evaluate, sample, density
 
     def shape(self, values: Mapping[str, Value]) -> npt.NDArray[np.float32]:
         """(2,): exponent and the lobe's peak."""

@@ -49,6 +49,7 @@ from studio_core.kernels.brdf import (
 )
 from studio_core.kernels.lobes import draw_cosine, draw_visible, weigh_cosine, weigh_visible
 from studio_core.params import Colour, Value, param
+from studio_plugins.brdfs.functions import Functions
 
 LEAST_ALPHA = 1e-4
 
@@ -114,30 +115,16 @@ def density(shape: Any, wo: Any, count: int, wi: Any, out: Any) -> None:
     weigh_visible(o, alpha, directions, terms[2 * count :])
 
 
-class Ggx:
+class Ggx(Functions):
     """See the module; satisfies `studio_core.contract.Brdf`."""
 
     id = "ggx"
     label = "Glossy or metal (GGX)"
     Params = Params
+    functions = evaluate, sample, density
     terms = 3
     textures: tuple[str, ...] = ("base_color", "metallic", "specular")
     shape_textures: tuple[str, ...] = ("roughness",)
-
-    @property
-    def address(self) -> int:
-        """Address of `evaluate`."""
-        return evaluate.address
-
-    @property
-    def sampler(self) -> int:
-        """Address of `sample`."""
-        return sample.address
-
-    @property
-    def density(self) -> int:
-        """Address of `density`."""
-        return density.address
 
     def shape(self, values: Mapping[str, Value]) -> npt.NDArray[np.float32]:
         """(1,): α."""

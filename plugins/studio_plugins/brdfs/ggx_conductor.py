@@ -47,6 +47,7 @@ from studio_core.kernels.lobes import draw_bounced, draw_visible, weigh_bounced,
 from studio_core.params import Colour, Value, param
 from studio_plugins.brdfs.curves import taken
 from studio_plugins.brdfs.facets import alpha_of, average_bounce, lost, missing, surviving
+from studio_plugins.brdfs.functions import Functions
 from studio_plugins.brdfs.ggx_dielectric import roughness
 
 _EDGE = 7 * (7 / 6) ** 6  # 1 / (u (1 − u)^6) at u = 1/7, where that is largest
@@ -117,29 +118,15 @@ def density(shape: Any, wo: Any, count: int, wi: Any, out: Any) -> None:
     weigh_bounced(o, alpha, directions, terms[3 * count :])
 
 
-class GgxConductor:
+class GgxConductor(Functions):
     """See the module; satisfies `studio_core.contract.Brdf`."""
 
     id = "ggx-conductor"
     label = "Metal (GGX)"
     Params = Params
+    functions = evaluate, sample, density
     terms = 4
     textures: tuple[str, ...] = ("base_color", "edge_tint")
-
-    @property
-    def address(self) -> int:
-        """Address of `evaluate`."""
-        return evaluate.address
-
-    @property
-    def sampler(self) -> int:
-        """Address of `sample`."""
-        return sample.address
-
-    @property
-    def density(self) -> int:
-        """Address of `density`."""
-        return density.address
 
     def shape(self, values: Mapping[str, Value]) -> npt.NDArray[np.float32]:
         """(18,): α, 1 / (π (1 − Ē)), and the curve of 1 − E."""

@@ -42,6 +42,7 @@ from studio_core.kernels.lobes import draw_skin, weigh_skin
 from studio_core.params import Colour, Value, param
 from studio_plugins.brdfs.curves import taken
 from studio_plugins.brdfs.facets import alpha_of, lost, mean_fresnel, missing, surviving
+from studio_plugins.brdfs.functions import Functions
 
 
 def ior(default: float = 1.5) -> Any:
@@ -109,29 +110,15 @@ def density(shape: Any, wo: Any, count: int, wi: Any, out: Any) -> None:
     weigh_skin(o, carray(shape, 1)[0], directions, terms)
 
 
-class GgxDielectric:
+class GgxDielectric(Functions):
     """See the module; satisfies `studio_core.contract.Brdf`."""
 
     id = "ggx-dielectric"
     label = "Clear gloss (GGX)"
     Params = Params
+    functions = evaluate, sample, density
     terms = 1
     textures: tuple[str, ...] = ("tint",)
-
-    @property
-    def address(self) -> int:
-        """Address of `evaluate`."""
-        return evaluate.address
-
-    @property
-    def sampler(self) -> int:
-        """Address of `sample`."""
-        return sample.address
-
-    @property
-    def density(self) -> int:
-        """Address of `density`."""
-        return density.address
 
     def shape(self, values: Mapping[str, Value]) -> npt.NDArray[np.float32]:
         """(19,): see `skin`."""

@@ -22,6 +22,7 @@ from studio_core.jit import batch_function
 from studio_core.kernels.brdf import DENSITY_SIGNATURE, ONE, SAMPLE_SIGNATURE, SIGNATURE, ZERO, carray
 from studio_core.kernels.lobes import draw_cosine, weigh_cosine
 from studio_core.params import Colour, Value, param
+from studio_plugins.brdfs.functions import Functions
 
 
 @dataclass(frozen=True)
@@ -57,29 +58,15 @@ def density(shape: Any, wo: Any, count: int, wi: Any, out: Any) -> None:
     weigh_cosine(o, directions, terms)
 
 
-class Lambert:
+class Lambert(Functions):
     """See the module; satisfies `studio_core.contract.Brdf`."""
 
     id = "lambert"
     label = "Matte"
     Params = Params
+    functions = evaluate, sample, density
     terms = 1
     textures: tuple[str, ...] = ("base_color",)
-
-    @property
-    def address(self) -> int:
-        """Address of `evaluate`."""
-        return evaluate.address
-
-    @property
-    def sampler(self) -> int:
-        """Address of `sample`."""
-        return sample.address
-
-    @property
-    def density(self) -> int:
-        """Address of `density`."""
-        return density.address
 
     def shape(self, values: Mapping[str, Value]) -> npt.NDArray[np.float32]:
         """Matte surfaces have no shape: (0,)."""

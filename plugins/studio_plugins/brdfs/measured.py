@@ -46,6 +46,7 @@ from studio_core.kernels.sampling import around_normal, cosine_density, cosine_d
 from studio_core.kernels.tables import REFERENCE, reference, referred
 from studio_core.params import Colour, Value, param
 from studio_core.scene.geometry import Table
+from studio_plugins.brdfs.functions import Functions
 
 F32 = npt.NDArray[np.float32]
 F64 = npt.NDArray[np.float64]
@@ -188,12 +189,13 @@ def density(shape: Any, wo: Any, count: int, wi: Any, out: Any) -> None:
         terms[k] = terms[count + k] = terms[2 * count + k] = both
 
 
-class Measured:
+class Measured(Functions):
     """See the module; satisfies `studio_core.contract.TabulatedBrdf`."""
 
     id = "measured"
     label = "Measured"
     Params = Params
+    functions = evaluate, sample, density
     terms = 3
     textures: tuple[str, ...] = ("tint",)
     tables: tuple[str, ...] = (SLOT,)
@@ -202,21 +204,6 @@ class Measured:
         self._plain = Table(np.full((2, 2, 2, 3), 0.5 / np.pi, np.float32), "grey")
         self._albedos: dict[str, F64] = {}
         self._angles: dict[str, F32] = {}
-
-    @property
-    def address(self) -> int:
-        """Address of `evaluate`."""
-        return evaluate.address
-
-    @property
-    def sampler(self) -> int:
-        """Address of `sample`."""
-        return sample.address
-
-    @property
-    def density(self) -> int:
-        """Address of `density`."""
-        return density.address
 
     def shape(self, values: Mapping[str, Value]) -> F32:
         """(145,) of the stand-in."""

@@ -43,6 +43,7 @@ from studio_core.kernels.brdf import (
 )
 from studio_core.kernels.sampling import cosine_density, cosine_direction, even_direction
 from studio_core.params import Colour, Value, param
+from studio_plugins.brdfs.functions import Functions
 
 _FALL = 0.5 - 2 / (3 * np.pi)
 _MEAN = 2 / 3 - 28 / (15 * np.pi)
@@ -135,29 +136,15 @@ def density(shape: Any, wo: Any, count: int, wi: Any, out: Any) -> None:
         d0[k] = (ONE - even) * d1[k] + even * lit * HALF * INV_PI
 
 
-class OrenNayar:
+class OrenNayar(Functions):
     """See the module; satisfies `studio_core.contract.Brdf`."""
 
     id = "oren-nayar"
     label = "Matte, rough (Oren–Nayar)"
     Params = Params
+    functions = evaluate, sample, density
     terms = 2
     textures: tuple[str, ...] = ("base_color",)
-
-    @property
-    def address(self) -> int:
-        """Address of `evaluate`."""
-        return evaluate.address
-
-    @property
-    def sampler(self) -> int:
-        """Address of `sample`."""
-        return sample.address
-
-    @property
-    def density(self) -> int:
-        """Address of `density`."""
-        return density.address
 
     def shape(self, values: Mapping[str, Value]) -> npt.NDArray[np.float32]:
         """(3,): r, A and the factor of b1."""

@@ -49,6 +49,7 @@ from studio_core.kernels.lobes import draw_cosine, draw_skin, weigh_cosine, weig
 from studio_core.params import Colour, Value, param
 from studio_plugins.brdfs.curves import at, curve, place, taken
 from studio_plugins.brdfs.facets import hemispherical, left_out, lost, mean_fresnel, mean_passage
+from studio_plugins.brdfs.functions import Functions
 from studio_plugins.brdfs.ggx_dielectric import ior, roughness, skin
 
 
@@ -122,29 +123,15 @@ def density(shape: Any, wo: Any, count: int, wi: Any, out: Any) -> None:
     weigh_cosine(o, directions, terms[count:])
 
 
-class Plastic:
+class Plastic(Functions):
     """See the module; satisfies `studio_core.contract.Brdf`."""
 
     id = "plastic"
     label = "Plastic or lacquer"
     Params = Params
+    functions = evaluate, sample, density
     terms = 2
     textures: tuple[str, ...] = ("base_color", "gloss")
-
-    @property
-    def address(self) -> int:
-        """Address of `evaluate`."""
-        return evaluate.address
-
-    @property
-    def sampler(self) -> int:
-        """Address of `sample`."""
-        return sample.address
-
-    @property
-    def density(self) -> int:
-        """Address of `density`."""
-        return density.address
 
     def shape(self, values: Mapping[str, Value]) -> npt.NDArray[np.float32]:
         """(37,): what describes the skin, F_ms, 1 / (π T̄), and the curve of what facets let through."""
