@@ -29,8 +29,21 @@ import numpy as np
 import numpy.typing as npt
 
 from studio_core.jit import batch_function
-from studio_core.kernels.brdf import LEAST_HEIGHT, ONE, SIGNATURE, ZERO, carray, exponential
+from studio_core.kernels.brdf import (
+    DENSITY_SIGNATURE,
+    LEAST_HEIGHT,
+    ONE,
+    SAMPLE_SIGNATURE,
+    SIGNATURE,
+    TWO,
+    ZERO,
+    carray,
+    exponential,
+)
+from studio_core.kernels.lobes import draw_cosine, weigh_cosine
+from studio_core.kernels.sampling import TURN, reflected
 from studio_core.params import Value, param
+from studio_plugins.brdfs.functions import Functions
 from studio_plugins.brdfs.grain import along, grain_direction
 from studio_plugins.brdfs.two_lobes import TwoLobeParams, TwoLobes
 
@@ -68,17 +81,52 @@ def evaluate(shape: Any, wo: Any, count: int, wi: Any, out: Any) -> None:
         b1[k] = lit * peak * (length2 * up) * up * exponential(-(gx * gx + gy * gy))
 
 
-class Ward(TwoLobes):
+@batch_function(SAMPLE_SIGNATURE)
+def sample(shape: Any, wo: Any, term: int, count: int, u: Any, wi: Any) -> None:
+    """By the cosine, and reflected at facets whose slopes are normally distributed: no weight exceeds 2."""
+    s, o, numbers, w = carray(shape, 5), carray(wo, 3), carray(u, 2 * count), carray(wi, 3 * count)
+    if term == 0:
+        draw_cosine(o, numbers, w)
+        return
+    c, d, narrow, wide = s[0], s[1], s[2], s[3]
+    ox, oy, oz = o[0], o[1], o[2]
+    for k in range(count):
+        far = np.sqrt(-np.log1p(-numbers[k]))
+        turn = TURN * numbers[count + k]
+        gx, gy = far * np.cos(turn) / narrow, far * np.sin(turn) / wide
+        hx, hy = c * gx - d * gy, d * gx + c * gy
+        up = ONE / np.sqrt(ONE + hx * hx + hy * hy)
+        hx, hy = hx * up, hy * up
+        facing = ox * hx + oy * hy + oz * up > ZERO
+        x, y, z = reflected(ox, oy, oz, hx, hy, up)
+        w[k], w[count + k] = x, y
+        w[2 * count + k] = z if (facing and oz > ZERO) else -ONE
+
+
+@batch_function(DENSITY_SIGNATURE)
+def density(shape: Any, wo: Any, count: int, wi: Any, out: Any) -> None:
+    """cos θ / π, and exp(−(slopes / α)²) / (π α_x α_y cos³ θ_h) / (4 ω_o·h)."""
+    s, o, w, terms = carray(shape, 5), carray(wo, 3), carray(wi, 3 * count), carray(out, 2 * count)
+    weigh_cosine(o, w, terms[:count])
+    c, d, narrow, wide, peak = s[0], s[1], s[2], s[3], s[4]
+    ox, oy, oz = o[0], o[1], o[2]
+    x, y, z, lobe = w[:count], w[count : 2 * count], w[2 * count :], terms[count:]
+    for k in range(count):
+        lit = ONE if (oz > ZERO and z[k] > ZERO) else ZERO
+        hx, hy, hz = x[k] + ox, y[k] + oy, max(z[k] + oz, LEAST_HEIGHT)
+        gx, gy = (c * hx + d * hy) * narrow / hz, (c * hy - d * hx) * wide / hz
+        length2 = hx * hx + hy * hy + hz * hz
+        tilt = length2 / (hz * hz)  # 1 / cos² θ_h; ω_o·h is half of H's length
+        lobe[k] = lit * peak * tilt / (TWO * hz) * exponential(-(gx * gx + gy * gy))
+
+
+class Ward(Functions, TwoLobes):
     """See the module; satisfies `studio_core.contract.Brdf`."""
 
     id = "ward"
     label = "Brushed (Ward)"
     Params = Params
-
-    @property
-    def address(self) -> int:
-        """Address of `evaluate`."""
-        return evaluate.address
+    functions = evaluate, sample, density
 
     def shape(self, values: Mapping[str, Value]) -> npt.NDArray[np.float32]:
         """(5,): the grain's direction, the inverse slopes and the peak."""

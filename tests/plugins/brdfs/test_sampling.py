@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from brdf_models import MODELS
+from brdf_models import BUNDLED, MODELS
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from oracles.brdf import unit
@@ -23,7 +23,6 @@ from studio_core.params import defaults
 SAMPLED = {name: model for name, model in MODELS.items() if is_sampled(model)}
 every_model = pytest.mark.parametrize("model", SAMPLED.values(), ids=SAMPLED.keys())
 GGX = ("ggx", "ggx-conductor", "ggx-dielectric", "plastic")
-DRAWING = ("lambert", "oren-nayar", "phong", "blinn-phong", "measured", *GGX)
 FRACTIONS = (0.0, 0.35, 1.0)
 ANGLES = np.radians([0.5, 50, 80, 89])
 MOST = 16.0  # times what a perfect draw would weigh
@@ -55,7 +54,7 @@ def lobes(model: Any, shape: Any) -> list[int]:
     return found
 
 
-@pytest.mark.parametrize("name", DRAWING)
+@pytest.mark.parametrize("name", BUNDLED)
 def test_models_that_must_draw_do(name: str) -> None:
     assert name in SAMPLED
 
