@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 
 import numpy as np
 import numpy.typing as npt
@@ -16,14 +15,6 @@ from studio_core.errors import Cancelled, InputError
 from studio_core.kernels.directions import direction_set
 from studio_core.kernels.environment import EnvironmentMap, integrate_environment, reduced_map
 from studio_core.parallel import Workers
-
-WORKERS = Workers(2)
-
-
-@pytest.fixture(scope="module", autouse=True)
-def _close() -> Iterator[None]:
-    yield
-    WORKERS.close()
 
 
 def turn(seed: int) -> npt.NDArray[np.float64]:
@@ -50,9 +41,11 @@ def power(leaves: npt.NDArray[np.float32]) -> npt.NDArray[np.float64]:
     value=st.sampled_from([0.0, 1e-4, 0.3, 1e6]),
     seed=st.integers(0, 9),
 )
-def test_a_constant_map_stays_constant(height: int, width: int, k: int, value: float, seed: int) -> None:
+def test_a_constant_map_stays_constant(
+    height: int, width: int, k: int, value: float, seed: int, workers: Workers
+) -> None:
     pixels = np.full((height, width, 3), value, np.float32)
-    leaves = integrate_environment(pixels, turn(seed), k, WORKERS)
+    leaves = integrate_environment(pixels, turn(seed), k, workers)
     np.testing.assert_allclose(leaves, value, rtol=2e-6)
 
 
@@ -64,10 +57,12 @@ def test_a_constant_map_stays_constant(height: int, width: int, k: int, value: f
     k=st.sampled_from([10, 11, 12]),
     seed=st.integers(0, 99),
 )
-def test_a_one_pixel_sun_keeps_its_power(height: int, where: float, column: int, k: int, seed: int) -> None:
+def test_a_one_pixel_sun_keeps_its_power(
+    height: int, where: float, column: int, k: int, seed: int, workers: Workers
+) -> None:
     pixels = np.full((height, 2 * height, 3), 0.01)
     pixels[round(where * (height - 1)), column % (2 * height)] = [1e5, 3e4, 0.5]
-    leaves = integrate_environment(pixels, turn(seed), k, WORKERS)
+    leaves = integrate_environment(pixels, turn(seed), k, workers)
     np.testing.assert_allclose(power(leaves), oracle.power(pixels), rtol=1e-4)
 
 
@@ -78,16 +73,18 @@ def test_a_one_pixel_sun_keeps_its_power(height: int, where: float, column: int,
     k=st.sampled_from([10, 12]),
     seed=st.integers(0, 99),
 )
-def test_a_suns_power_lands_in_its_own_leaves(height: int, where: float, k: int, seed: int) -> None:
+def test_a_suns_power_lands_in_its_own_leaves(
+    height: int, where: float, k: int, seed: int, workers: Workers
+) -> None:
     """Scaling to the right power must not hide a sun that the sampling lost: the sky around stays."""
     pixels = np.full((height, 2 * height, 3), 1.0)
     pixels[round(where * (height - 1)), 7, 0] = 1e5
-    leaves = integrate_environment(pixels, turn(seed), k, WORKERS)
+    leaves = integrate_environment(pixels, turn(seed), k, workers)
     np.testing.assert_allclose(leaves[:, 1], 1.0, rtol=1e-5)
     np.testing.assert_allclose(np.median(leaves[:, 0]), 1.0, rtol=5e-2)  # lost, it would be many times that
 
 
-def test_power_is_the_pixels_sum_away_from_the_poles() -> None:
+def test_power_is_the_pixels_sum_away_from_the_poles(workers: Workers) -> None:
     """What a user would expect of a sun: radiance times the pixel's solid angle."""
     height = 256
     pixels = np.zeros((height, 512, 3))
@@ -95,15 +92,15 @@ def test_power_is_the_pixels_sum_away_from_the_poles() -> None:
     ring = math.cos(math.pi * 90 / height) - math.cos(math.pi * 91 / height)
     expected = 1e5 * ring * 2 * math.pi / 512
     np.testing.assert_allclose(
-        power(integrate_environment(pixels, turn(3), 12, WORKERS)), expected, rtol=3e-3
+        power(integrate_environment(pixels, turn(3), 12, workers)), expected, rtol=3e-3
     )
 
 
 @pytest.mark.parametrize("shape", [(4096, 64), (700, 1500), (333, 128)])
-def test_averaging_down_keeps_power(shape: tuple[int, int]) -> None:
+def test_averaging_down_keeps_power(shape: tuple[int, int], workers: Workers) -> None:
     rng = np.random.default_rng(0)
     pixels = rng.lognormal(0, 2, (*shape, 3)).astype(np.float32)
-    small = reduced_map(pixels, 10, WORKERS)
+    small = reduced_map(pixels, 10, workers)
     assert small.shape[0] <= 200
     edges = np.cos(np.pi * np.arange(shape[0] + 1) / shape[0])
     whole = np.einsum("hwc,h->c", pixels.astype(np.float64), edges[:-1] - edges[1:]) / shape[1]
@@ -112,19 +109,19 @@ def test_averaging_down_keeps_power(shape: tuple[int, int]) -> None:
     np.testing.assert_allclose(kept, whole, rtol=1e-5)
 
 
-def test_leaves_are_means_over_their_cells() -> None:
+def test_leaves_are_means_over_their_cells(workers: Workers) -> None:
     rng = np.random.default_rng(1)
     pixels = rng.uniform(0, 1, (24, 48, 3))
     rotation = turn(5)
-    leaves = integrate_environment(pixels, rotation, 10, WORKERS)
-    wide = reduced_map(pixels.astype(np.float32), 10, WORKERS).astype(np.float64)
+    leaves = integrate_environment(pixels, rotation, 10, workers)
+    wide = reduced_map(pixels.astype(np.float32), 10, workers).astype(np.float64)
     np.testing.assert_array_equal(wide[6:18], pixels[6:18].astype(np.float32))
     for leaf in rng.integers(0, 1024, 12):
         expected = oracle.mean_over_leaf(wide, rotation, int(leaf), 10, 40)
         np.testing.assert_allclose(leaves[leaf], expected, rtol=2e-3, atol=3e-3)
 
 
-def test_u_and_v_follow_openexr() -> None:
+def test_u_and_v_follow_openexr(workers: Workers) -> None:
     """The middle column looks at +z, a quarter from the left at +x, the first row up."""
     directions = direction_set(10).directions
     for row, column, axis in (
@@ -134,31 +131,31 @@ def test_u_and_v_follow_openexr() -> None:
     ):
         pixels = np.zeros((64, 128, 3), np.float32)
         pixels[row - 1 : row + 1, [column - 1, column]] = 1.0
-        leaves = integrate_environment(pixels, np.eye(3), 10, WORKERS)
+        leaves = integrate_environment(pixels, np.eye(3), 10, workers)
         centroid = leaves[:, 0] @ directions
         assert centroid @ np.array(axis) / np.linalg.norm(centroid) > 0.998
     pixels = np.zeros((64, 128, 3), np.float32)
     pixels[:2] = 1.0
     above = direction_set(10).leaf_of([[0.0, 1.0, 0.0]])[0]
-    assert integrate_environment(pixels, np.eye(3), 10, WORKERS)[above, 0] > 0.3
+    assert integrate_environment(pixels, np.eye(3), 10, workers)[above, 0] > 0.3
 
 
-def test_turning_the_map_equals_rolling_it() -> None:
+def test_turning_the_map_equals_rolling_it(workers: Workers) -> None:
     rng = np.random.default_rng(2)
     pixels = rng.uniform(0, 1, (32, 64, 3)).astype(np.float32)
-    turned = integrate_environment(pixels, about_y(math.pi / 2), 10, WORKERS)
-    rolled = integrate_environment(np.roll(pixels, -16, axis=1), np.eye(3), 10, WORKERS)
+    turned = integrate_environment(pixels, about_y(math.pi / 2), 10, workers)
+    rolled = integrate_environment(np.roll(pixels, -16, axis=1), np.eye(3), 10, workers)
     np.testing.assert_allclose(turned, rolled, rtol=1e-3, atol=1e-4)
 
 
-def test_one_and_two_threads_give_the_same_bits() -> None:
+def test_one_and_two_threads_give_the_same_bits(workers: Workers) -> None:
     pixels = np.random.default_rng(4).uniform(0, 1, (400, 500, 3))
     with Workers(1) as one:
         alone = integrate_environment(pixels, turn(1), 11, one)
-    np.testing.assert_array_equal(alone, integrate_environment(pixels, turn(1), 11, WORKERS))
+    np.testing.assert_array_equal(alone, integrate_environment(pixels, turn(1), 11, workers))
 
 
-def test_integration_can_be_cancelled() -> None:
+def test_integration_can_be_cancelled(workers: Workers) -> None:
     class Impatient:
         calls = 0
 
@@ -168,7 +165,7 @@ def test_integration_can_be_cancelled() -> None:
                 raise Cancelled
 
     with pytest.raises(Cancelled):
-        integrate_environment(np.ones((64, 128, 3)), np.eye(3), 12, WORKERS, Impatient())
+        integrate_environment(np.ones((64, 128, 3)), np.eye(3), 12, workers, Impatient())
 
 
 @pytest.mark.parametrize(
@@ -185,15 +182,15 @@ def test_integration_can_be_cancelled() -> None:
     ],
 )
 def test_what_is_no_radiance_is_refused(
-    pixels: npt.NDArray[np.float64], rotation: npt.NDArray[np.float64], cause: str
+    pixels: npt.NDArray[np.float64], rotation: npt.NDArray[np.float64], cause: str, workers: Workers
 ) -> None:
     with pytest.raises(InputError, match=cause):
-        integrate_environment(pixels, rotation, 10, WORKERS)
+        integrate_environment(pixels, rotation, 10, workers)
 
 
-def test_a_map_made_ready_once_serves_every_rotation() -> None:
+def test_a_map_made_ready_once_serves_every_rotation(workers: Workers) -> None:
     pixels = np.random.default_rng(5).uniform(0, 1, (40, 80, 3))
-    ready = EnvironmentMap.prepare(pixels, 10, WORKERS)
+    ready = EnvironmentMap.prepare(pixels, 10, workers)
     for seed in (0, 1):
-        fresh = integrate_environment(pixels, turn(seed), 10, WORKERS)
-        np.testing.assert_array_equal(ready.over_leaves(turn(seed), WORKERS), fresh)
+        fresh = integrate_environment(pixels, turn(seed), 10, workers)
+        np.testing.assert_array_equal(ready.over_leaves(turn(seed), workers), fresh)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 
 import numpy as np
 import numpy.typing as npt
@@ -15,14 +14,6 @@ from studio_core.kernels.directions import direction_set
 from studio_core.kernels.environment import integrate_environment
 from studio_core.kernels.light_tree import LightTree, rotate_radiance
 from studio_core.parallel import Workers
-
-WORKERS = Workers(2)
-
-
-@pytest.fixture(scope="module", autouse=True)
-def _close() -> Iterator[None]:
-    yield
-    WORKERS.close()
 
 
 def turn(seed: int) -> npt.NDArray[np.float64]:
@@ -36,19 +27,19 @@ def power(leaves: npt.NDArray[np.float32]) -> npt.NDArray[np.float64]:
     return np.asarray(leaves.sum(axis=0, dtype=np.float64) * 4 * math.pi / len(leaves))
 
 
-def test_fast_turning_follows_the_exact_one() -> None:
+def test_fast_turning_follows_the_exact_one(workers: Workers) -> None:
     rng = np.random.default_rng(3)
     sky = np.clip(np.cos(np.linspace(0, np.pi, 48)), 0, 1)[:, None, None] * np.ones((48, 96, 3))
     pixels = sky + rng.uniform(0, 0.05, (48, 96, 3))
     pixels[10:14, 20:25] += [5.0, 4.0, 3.0]
     rotation = turn(8)
-    still = integrate_environment(pixels, np.eye(3), 14, WORKERS)
-    exact = integrate_environment(pixels, rotation, 12, WORKERS)
-    fast = rotate_radiance(still, rotation, 12, WORKERS)
+    still = integrate_environment(pixels, np.eye(3), 14, workers)
+    exact = integrate_environment(pixels, rotation, 12, workers)
+    fast = rotate_radiance(still, rotation, 12, workers)
     np.testing.assert_allclose(power(fast), power(exact), rtol=1e-3)
     error = np.sqrt(((fast.astype(np.float64) - exact) ** 2).mean()) / exact.mean()
     assert error < 0.05
-    np.testing.assert_array_equal(rotate_radiance(np.zeros_like(still), rotation, 10, WORKERS), 0.0)
+    np.testing.assert_array_equal(rotate_radiance(np.zeros_like(still), rotation, 10, workers), 0.0)
 
 
 @pytest.mark.parametrize("k", [10, 13])
@@ -115,31 +106,31 @@ def test_leaves_that_are_no_light_are_refused(radiance: npt.NDArray[np.float64],
 
 
 @pytest.mark.parametrize("k", [10, 15])
-def test_trees_are_the_same_bits_with_any_threads(k: int) -> None:
+def test_trees_are_the_same_bits_with_any_threads(k: int, workers: Workers) -> None:
     radiance = np.random.default_rng(k).lognormal(0, 2, (1 << k, 3))
     alone = LightTree.build(radiance)
     with Workers(3) as three:
-        for workers in (WORKERS, three):
-            made = LightTree.build(radiance, workers)
+        for some in (workers, three):
+            made = LightTree.build(radiance, some)
             for name in ("radiance", "node_sum", "node_moment", "prefix_power", "prefix_vector"):
                 np.testing.assert_array_equal(getattr(made, name), getattr(alone, name))
 
 
 @pytest.mark.parametrize("k", [10, 15])
-def test_turns_are_the_same_bits_with_any_threads(k: int) -> None:
+def test_turns_are_the_same_bits_with_any_threads(k: int, workers: Workers) -> None:
     leaves = np.random.default_rng(k).lognormal(0, 2, (1 << 13, 3)).astype(np.float32)
     with Workers(1) as one:
         alone = rotate_radiance(leaves, turn(2), k, one)
-    np.testing.assert_array_equal(alone, rotate_radiance(leaves, turn(2), k, WORKERS))
+    np.testing.assert_array_equal(alone, rotate_radiance(leaves, turn(2), k, workers))
 
 
-def test_turning_there_and_back_moves_light_by_little() -> None:
+def test_turning_there_and_back_moves_light_by_little(workers: Workers) -> None:
     """A spot of light stays where the rotation takes its middle."""
     directions = direction_set(13).directions.astype(np.float64)
     axis = np.array([0.6, 0.48, 0.64])
     leaves = np.repeat(np.exp(40 * (directions @ axis - 1))[:, None], 3, axis=1).astype(np.float32)
     for seed in range(6):
         rotation = turn(seed)
-        centroid = rotate_radiance(leaves, rotation, 13, WORKERS)[:, 0].astype(np.float64) @ directions
+        centroid = rotate_radiance(leaves, rotation, 13, workers)[:, 0].astype(np.float64) @ directions
         centroid /= np.linalg.norm(centroid)
         assert np.degrees(np.arccos(min(1.0, centroid @ (rotation @ axis)))) < 0.05

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -21,13 +20,6 @@ from studio_core.shading.materials import linear_rgb
 
 F32 = npt.NDArray[np.float32]
 F64 = npt.NDArray[np.float64]
-WORKERS = Workers(2)
-
-
-@pytest.fixture(scope="module", autouse=True)
-def _close() -> Iterator[None]:
-    yield
-    WORKERS.close()
 
 
 def directions(height: int) -> F64:
@@ -96,10 +88,12 @@ def test_taken_out_and_put_back_is_the_map(
     power=st.floats(2, 7),
     seed=st.integers(0, 5),
 )
-def test_without_suns_no_leaf_holds_much(towards: F64, across: float, power: float, seed: int) -> None:
+def test_without_suns_no_leaf_holds_much(
+    towards: F64, across: float, power: float, seed: int, workers: Workers
+) -> None:
     pixels = disc(96, towards, across, 10.0**power, seed)
     rest, sun = split_suns(pixels)
-    leaves = integrate_environment(rest, np.eye(3), 15, WORKERS).astype(np.float64).sum(axis=1)
+    leaves = integrate_environment(rest, np.eye(3), 15, workers).astype(np.float64).sum(axis=1)
     total = map_power(pixels).sum()
     assert leaves.max() * 4 * math.pi / (1 << 15) < 0.01 * total
     if power > 4:
@@ -215,9 +209,9 @@ def test_many_sparks_stay_within_the_samples() -> None:
         ("third_party/openexr_env/KernerEnvLatLong.exr", 0.19),
     ],
 )
-def test_real_maps(shared_data: Path, name: str, share: float) -> None:
+def test_real_maps(shared_data: Path, name: str, share: float, workers: Workers) -> None:
     pixels = linear_rgb(load_environment(shared_data / name)[0])
     rest, sun = split_suns(pixels)
     assert light_of(sun).sum() / map_power(pixels).sum() == pytest.approx(share, rel=0.03)
-    leaves = integrate_environment(rest, np.eye(3), 15, WORKERS).astype(np.float64).sum(axis=1)
+    leaves = integrate_environment(rest, np.eye(3), 15, workers).astype(np.float64).sum(axis=1)
     assert leaves.max() * 4 * math.pi / (1 << 15) < 0.01 * map_power(pixels).sum()
