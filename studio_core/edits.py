@@ -10,7 +10,7 @@ import dataclasses
 import itertools
 from collections.abc import Container, Iterable, Mapping
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from typing import Any, Protocol, TypeVar
 
 import numpy as np
 
@@ -20,6 +20,8 @@ from studio_core.params import ParamInfo, Value, check, param_infos
 from studio_core.scene.geometry import Geometry, Image, Table, Texture
 from studio_core.scene.nodes import Material, MaterialId, MeshObject, Node, NodeId, Scene, new_id
 from studio_core.scene.transform import IDENTITY, Transform
+
+T = TypeVar("T")
 
 
 class Edit(Protocol):
@@ -261,11 +263,8 @@ class SetTexture:
 
     def __call__(self, scene: Scene) -> Scene:
         old = scene.material(self.material)
-        textures = {**old.textures}
-        textures.pop(self.parameter, None)
-        if self.texture is not None:
-            textures[self.parameter] = self.texture
-        return scene.with_materials(dataclasses.replace(old, textures=frozen_map(textures)))
+        textures = _with_entry(old.textures, self.parameter, self.texture)
+        return scene.with_materials(dataclasses.replace(old, textures=textures))
 
 
 @dataclass(frozen=True)
@@ -279,11 +278,14 @@ class SetTable:
 
     def __call__(self, scene: Scene) -> Scene:
         old = scene.material(self.material)
-        tables = {**old.tables}
-        tables.pop(self.slot, None)
-        if self.table is not None:
-            tables[self.slot] = self.table
-        return scene.with_materials(dataclasses.replace(old, tables=frozen_map(tables)))
+        tables = _with_entry(old.tables, self.slot, self.table)
+        return scene.with_materials(dataclasses.replace(old, tables=tables))
+
+
+def _with_entry(entries: Mapping[str, T], name: str, entry: T | None) -> Mapping[str, T]:
+    """The same with another entry of that name, at the end, or with none."""
+    others = {key: value for key, value in entries.items() if key != name}
+    return frozen_map(others if entry is None else {**others, name: entry})
 
 
 def duplicate(

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import functools
-import importlib
 import itertools
-from collections.abc import Iterator
-from importlib.metadata import entry_points
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 import pytest
+from brdf_models import MODELS
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from oracles.brdf import ORACLES, unit
@@ -19,63 +17,20 @@ from oracles.brdf import ORACLES, unit
 from studio_core.brdfs.albedo import quadrature_albedo
 from studio_core.brdfs.calls import evaluate
 from studio_core.brdfs.quadrature import over_hemisphere
-from studio_core.params import ParamInfo, defaults, param_infos
+from studio_core.brdfs.ranges import at_fraction, colour_corners, shaped, shaping
+from studio_core.params import defaults, param_infos
 from studio_core.shading.materials import shape_textures
-from studio_plugins.brdfs import plugin as bundled
 
 Float = npt.NDArray[np.float32]
 GRID = 16
 GOLDEN = np.pi * (3 - np.sqrt(5))
 TOLERANCE = 3e-5  # of the integral over one box of some dozens
+shaping_of = functools.cache(shaping)
 
-
-def _models() -> Iterator[Any]:
-    found = [bundled, *(point.load() for point in entry_points(group="studio.plugins"))]
-    for name in {name: None for plugin in found for name in plugin.provides.get("brdf", {}).values()}:
-        module, _, attribute = name.partition(":")
-        yield getattr(importlib.import_module(module), attribute)
-
-
-MODELS = {model.id: model for model in _models()}
 every_model = pytest.mark.parametrize("model", MODELS.values(), ids=MODELS.keys())
 with_oracle = pytest.mark.parametrize(
     "model", [MODELS[name] for name in ORACLES if name in MODELS], ids=lambda m: m.id
 )
-
-
-def at(info: ParamInfo, fraction: float) -> Any:
-    """The value a slider shows at `fraction` of its way."""
-    if info.kind == "flag":
-        return fraction > 0.5
-    if info.kind == "choice":
-        return info.choices[round(fraction * (len(info.choices) - 1))]
-    if info.scale == "log":
-        value = float(np.exp((1 - fraction) * np.log(info.low) + fraction * np.log(info.high)))
-        value = min(max(value, info.low), info.high)
-    else:
-        value = info.low + fraction * (info.high - info.low)
-    if info.kind == "integer":
-        return round(value)
-    return (value, value, value) if info.kind == "colour" else value
-
-
-@functools.cache
-def split(model: Any) -> tuple[list[str], list[str]]:
-    """Names of the parameters that change the shape, and of the others."""
-    infos, start = param_infos(model.Params), defaults(model.Params)
-    known = model.shape(start)
-    shaping = [
-        name
-        for name, info in infos.items()
-        if any(not np.array_equal(model.shape({**start, name: at(info, f)}), known) for f in (0, 0.37, 1))
-    ]
-    return shaping, [name for name in infos if name not in shaping]
-
-
-def shaped(model: Any, fraction: float) -> dict[str, Any]:
-    """Defaults, with everything that changes the shape at `fraction` of its way."""
-    infos = param_infos(model.Params)
-    return {**defaults(model.Params), **{name: at(infos[name], fraction) for name in split(model)[0]}}
 
 
 def coefficients(model: Any, values: Any) -> Float:
@@ -88,15 +43,11 @@ def anisotropic(model: Any) -> bool:
 
 def grid(model: Any) -> tuple[list[float], npt.NDArray[np.float64], list[dict[str, Any]]]:
     """Shape fractions, wo, and every corner of what is not shape."""
-    fractions = list(np.linspace(0, 1, GRID)) if split(model)[0] else [0.0]
+    fractions = list(np.linspace(0, 1, GRID)) if shaping_of(model)[0] else [0.0]
     theta = np.radians(np.linspace(0, 89, GRID))
     turn = GOLDEN * np.arange(GRID) if anisotropic(model) else 0 * theta
     wo = np.stack([np.sin(theta) * np.cos(turn), np.sin(theta) * np.sin(turn), np.cos(theta)], -1)
-    infos, names = param_infos(model.Params), split(model)[1]
-    corners = [
-        {name: at(infos[name], f) for name, f in zip(names, fs, strict=True)}
-        for fs in itertools.product((0.0, 1.0), repeat=len(names))
-    ]
+    corners = list(colour_corners(model))
     return fractions, wo, corners
 
 
@@ -126,14 +77,14 @@ def test_returns_no_more_light_than_arrives(model: Any) -> None:
 
 @every_model
 def test_returns_no_more_light_at_any_corner_of_its_shape(model: Any) -> None:
-    names = split(model)[0]
+    names = shaping_of(model)[0]
     infos, corners = param_infos(model.Params), grid(model)[2]
     theta, turn = np.radians([0, 30, 60, 80, 89]), np.array([0, 0.4, 1.1, np.pi / 2, 2.2])
     wo = np.stack([np.sin(theta) * np.cos(turn), np.sin(theta) * np.sin(turn), np.cos(theta)], -1)
     for fractions in itertools.product((0.0, 1.0), repeat=len(names)):
         values = {
             **defaults(model.Params),
-            **{n: at(infos[n], f) for n, f in zip(names, fractions, strict=True)},
+            **{n: at_fraction(infos[n], f) for n, f in zip(names, fractions, strict=True)},
         }
         found = quadrature_albedo(model, model.shape(values), wo, TOLERANCE)
         for corner in corners:
@@ -192,7 +143,7 @@ def test_is_reciprocal(model: Any, fraction: float) -> None:
 @given(data=st.data(), seed=st.integers(0, 2**32 - 1))
 def test_kernel_is_the_oracle(model: Any, data: Any, seed: int) -> None:
     infos = param_infos(model.Params)
-    values = {name: at(info, data.draw(st.floats(0, 1), name)) for name, info in infos.items()}
+    values = {name: at_fraction(info, data.draw(st.floats(0, 1), name)) for name, info in infos.items()}
     w = directions(np.random.default_rng(seed), 32).astype(np.float32)
     c = coefficients(model, values).astype(np.float64)
     # In float32 a mirrored pair that also grazes does not say where its half vector points.
@@ -226,7 +177,7 @@ def any_direction(draw: Any) -> Float:
 def test_is_finite_everywhere_and_dark_from_below(model: Any, data: Any, wo: Float, wi: list[Float]) -> None:
     infos = param_infos(model.Params)
     fraction = st.one_of(st.sampled_from([0.0, 1.0]), st.floats(0, 1))
-    values = {name: at(info, data.draw(fraction, name)) for name, info in infos.items()}
+    values = {name: at_fraction(info, data.draw(fraction, name)) for name, info in infos.items()}
     mirrored = [w * np.array([-1, -1, 1], np.float32) for w in [*wi, wo]]
     every = np.array([*wi, *mirrored, wo])
     made = evaluate(model, model.shape(values), wo, every)
@@ -251,17 +202,17 @@ def test_coefficients_are_per_texel(model: Any) -> None:
     assert made.dtype == np.float32
     one = {**plain, **{name: texel[2, 3] for name, texel in texels.items()}}
     np.testing.assert_array_equal(made[2, 3], model.coefficients(one))
-    assert set(model.textures) <= set(split(model)[1])
+    assert set(model.textures) <= set(shaping_of(model)[1])
 
 
 @every_model
 def test_pictures_of_the_shape_are_of_its_numbers_and_colour_nothing(model: Any) -> None:
-    infos, shaping = param_infos(model.Params), split(model)[0]
+    infos, shaping = param_infos(model.Params), shaping_of(model)[0]
     for name in shape_textures(model):
         assert name in shaping
         assert infos[name].kind == "number"
         if name not in model.textures:
-            varied = ({**defaults(model.Params), name: at(infos[name], f)} for f in (0, 0.6, 1))
+            varied = ({**defaults(model.Params), name: at_fraction(infos[name], f)} for f in (0, 0.6, 1))
             made = [coefficients(model, values) for values in varied]
             np.testing.assert_array_equal(made[0], made[1])
             np.testing.assert_array_equal(made[0], made[2])
