@@ -61,12 +61,15 @@ class Facts:
     told: dict[str, Any] = field(default_factory=dict)
 
 
-def decode_file(path: str, limits: Limits, *, encoded: bool = False) -> tuple[Pixels, Facts]:
+def decode_file(
+    path: str, limits: Limits, *, encoded: bool = False, plain: bool = False
+) -> tuple[Pixels, Facts]:
     """Pixels (H, W, 1, 3 or 4) of uint8 (sRGB) or float32 (linear Rec.709), and the facts.
 
     Alpha is kept as the fourth channel as the file has it (associated in OpenEXR, straight elsewhere).
     `encoded`: whole numbers stay as they are, of uint8 or uint16, and small faults in how a camera wrote its
-    JPEG, which change no pixel, are passed over. Raises Unreadable.
+    JPEG, which change no pixel, are passed over. `plain`: numbers that are no colours, such as roughness or
+    normals: no transfer curve and no primaries are undone; 16 bits become 0…1. Raises Unreadable.
     """
     import OpenImageIO as oiio  # noqa: N813 - its customary name
 
@@ -78,12 +81,14 @@ def decode_file(path: str, limits: Limits, *, encoded: bool = False) -> tuple[Pi
     if source is None:
         raise Unreadable(_failure(oiio) or "it is no picture of a known format")
     try:
-        return _decode(oiio, source, path, limits, encoded)
+        return _decode(oiio, source, path, limits, encoded, plain)
     finally:
         source.close()
 
 
-def _decode(oiio: Any, source: Any, path: str, limits: Limits, encoded: bool) -> tuple[Pixels, Facts]:
+def _decode(
+    oiio: Any, source: Any, path: str, limits: Limits, encoded: bool, plain: bool
+) -> tuple[Pixels, Facts]:
     notes: list[str] = []
     part, spec, chosen = _part(source, notes)
     _check(spec, limits)
@@ -111,8 +116,9 @@ def _decode(oiio: Any, source: Any, path: str, limits: Limits, encoded: bool) ->
     if form == "openexr":
         if envmap != "cube":
             pixels = _display(pixels, spec, limits, notes)
-        given = _attribute(spec, "chromaticities", None)
-        pixels = _primaries(pixels, given, _attribute(spec, "adoptedNeutral", None), notes)
+        if not plain:
+            given = _attribute(spec, "chromaticities", None)
+            pixels = _primaries(pixels, given, _attribute(spec, "adoptedNeutral", None), notes)
     exposure = 1.0
     if form == "hdr":
         with Path(path).open("rb") as file:
@@ -121,7 +127,9 @@ def _decode(oiio: Any, source: Any, path: str, limits: Limits, encoded: bool) ->
         pixels = _radiance(pixels, header, notes)
     encoding: Literal["linear", "srgb"] = "srgb" if whole else "linear"
     linear = kind in ("half", "float", "double") or _says_linear(_attribute(spec, "oiio:ColorSpace", ""))
-    if whole and linear and not encoded:
+    if plain:
+        encoding = "linear"
+    elif whole and linear and not encoded:
         pixels, encoding = pixels.astype(np.float32) / 255, "linear"
     elif not whole and not linear:
         pixels = pixels.astype(np.float32)

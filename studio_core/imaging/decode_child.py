@@ -1,9 +1,9 @@
 """The decoder child: reads requests from stdin, answers with pixels on stdout.
 
-A request is a line of JSON, `{"path": …}`, with `"photograph": true` for the encoded numbers of one. The
-answer is a line of JSON, either `{"error": …}` or `{"shape": …, "dtype": …, "facts": …}`, and then the raw
-pixels. The process has a memory limit where the system knows one, writes nothing and has no state between
-requests.
+A request is a line of JSON, `{"path": …}`, with `"photograph": true` for the encoded numbers of one, with
+`"plain": true` for numbers that are no colours. The answer is a line of JSON, either `{"error": …}` or
+`{"shape": …, "dtype": …, "facts": …}`, and then the raw pixels. The process has a memory limit where the
+system knows one, writes nothing and has no state between requests.
 """
 
 from __future__ import annotations
@@ -46,8 +46,10 @@ def main(pixels: int, megabytes: int) -> None:
         data = None
         try:
             request = json.loads(line)
-            decode = decode_photograph if request.get("photograph") else decode_file
-            made, facts = decode(request["path"], limits)
+            if request.get("photograph"):
+                made, facts = decode_photograph(request["path"], limits)
+            else:
+                made, facts = decode_file(request["path"], limits, plain=bool(request.get("plain")))
             answer = {
                 "shape": made.shape,
                 "dtype": str(made.dtype),

@@ -73,11 +73,16 @@ class ImageDecoder:
     ) -> None:
         self.close()
 
-    def read(self, path: str | os.PathLike[str]) -> Image:
-        """The picture in a file, made finite; InputError naming the file when it cannot be read."""
-        return _finite(*self.read_pixels(path))
+    def read(self, path: str | os.PathLike[str], *, plain: bool = False) -> Image:
+        """The picture in a file, made finite; InputError naming the file when it cannot be read.
 
-    def read_pixels(self, path: str | os.PathLike[str]) -> tuple[npt.NDArray[Any], Facts]:
+        `plain`: numbers that are no colours (roughness, normals), without any transfer curve.
+        """
+        return _finite(*self.read_pixels(path, plain=plain), plain)
+
+    def read_pixels(
+        self, path: str | os.PathLike[str], *, plain: bool = False
+    ) -> tuple[npt.NDArray[Any], Facts]:
         """The pixels as the file holds them, NaN and Inf included, and what it says about them."""
         path = Path(path)
         name = str(path)
@@ -94,36 +99,36 @@ class ImageDecoder:
         if suffix is None:
             raise InputError(f"{name} cannot be read: it is no picture of a known format")
         if suffix == ".hdr" and not parse_header(start).format:
-            return self._ask_bytes(path.read_bytes(), suffix, name)
+            return self._ask_bytes(path.read_bytes(), suffix, name, plain)
         if suffix == path.suffix.lower() and _plain(name):
-            return self._ask(str(path.resolve()), name)
+            return self._ask(str(path.resolve()), name, plain=plain)
         with tempfile.TemporaryDirectory(prefix="lucarne-") as folder:
             copy = Path(folder) / f"picture{suffix}"
             try:
                 shutil.copyfile(path, copy)
             except OSError as error:
                 raise InputError(f"{name} cannot be read: {error.strerror or error}") from None
-            return self._ask(str(copy), name)
+            return self._ask(str(copy), name, plain=plain)
 
-    def decode(self, data: bytes, name: str) -> Image:
-        """The picture in the bytes of a file, made finite; `name` is what messages call it."""
+    def decode(self, data: bytes, name: str, *, plain: bool = False) -> Image:
+        """The picture in the bytes of a file, made finite; messages call it `name`. `plain` as for `read`."""
         suffix = suffix_of(data[:HEADER], Path(name).suffix.lower()[:8] if "\0" not in name else "")
         if suffix is None:
             raise InputError(f"{name} cannot be read: it is no picture of a known format")
-        return _finite(*self._ask_bytes(data, suffix, name))
+        return _finite(*self._ask_bytes(data, suffix, name, plain), plain)
 
     def close(self) -> None:
         """End the child; a later read starts a new one."""
         with self._lock:
             self._stop()
 
-    def _ask_bytes(self, data: bytes, suffix: str, name: str) -> tuple[npt.NDArray[Any], Facts]:
+    def _ask_bytes(self, data: bytes, suffix: str, name: str, plain: bool) -> tuple[npt.NDArray[Any], Facts]:
         if suffix == ".hdr" and not parse_header(data).format:
             data = with_format(data)
         with tempfile.TemporaryDirectory(prefix="lucarne-") as folder:
             copy = Path(folder) / f"picture{suffix}"
             copy.write_bytes(data)
-            return self._ask(str(copy), name)
+            return self._ask(str(copy), name, plain=plain)
 
     def photograph(self, data: bytes, suffix: str, name: str) -> tuple[npt.NDArray[Any], Facts]:
         """Encoded numbers of a photograph in a file's bytes, and the facts (`photograph_decode`)."""
@@ -132,8 +137,10 @@ class ImageDecoder:
             copy.write_bytes(data)
             return self._ask(str(copy), name, photograph=True)
 
-    def _ask(self, path: str, name: str, *, photograph: bool = False) -> tuple[npt.NDArray[Any], Facts]:
-        request = {"path": path, "photograph": photograph}
+    def _ask(
+        self, path: str, name: str, *, photograph: bool = False, plain: bool = False
+    ) -> tuple[npt.NDArray[Any], Facts]:
+        request = {"path": path, "photograph": photograph, "plain": plain}
         with self._lock:
             child = self._start()
             late = threading.Event()
@@ -218,12 +225,12 @@ class ImageDecoder:
         child.wait()
 
 
-def _finite(pixels: npt.NDArray[Any], facts: Facts) -> Image:
+def _finite(pixels: npt.NDArray[Any], facts: Facts, plain: bool) -> Image:
     """The picture with 0 for NaN and -Inf, and the brightest other number for Inf."""
     if pixels.dtype == np.float32 and not (np.isfinite(pixels.min()) and np.isfinite(pixels.max())):
         brightest = pixels.max(initial=0.0, where=np.isfinite(pixels))
         pixels = np.nan_to_num(pixels, nan=0.0, posinf=brightest, neginf=0.0)
-    return Image(pixels, facts.encoding)
+    return Image(pixels, "data" if plain else facts.encoding)
 
 
 def read_image(

@@ -70,7 +70,7 @@ class GltfMaterials:
             scale, offset, uv_set = self._placing(reference)
             textures["base_color"] = Texture(opaque(image), scale, offset)
         second = pbr.get("metallicRoughnessTexture")
-        both = self._image(second)
+        both = self._image(second, plain=True)
         if both is not None and isinstance(second, dict):
             placing = self._placing(second)
             means = self._vary(both, placing, uv_set, textures, name)
@@ -169,8 +169,11 @@ class GltfMaterials:
             (self.file.whole(transform, "texCoord", uv_set)),
         )
 
-    def _image(self, reference: object) -> Image | None:
-        """The picture of a texture reference, None (with a note) when it cannot be had."""
+    def _image(self, reference: object, *, plain: bool = False) -> Image | None:
+        """The picture of a texture reference, None (with a note) when it cannot be had.
+
+        `plain`: its numbers are no colours.
+        """
         if not isinstance(reference, dict):
             return None
         texture = self.file.item("textures", reference.get("index"))
@@ -191,7 +194,8 @@ class GltfMaterials:
         except InputError as error:
             self.notes.say(f"The picture {name!r} was left out: {error}.")
             return None
-        return self.pictures.data(("image", place), data, f"the picture {name!r} of {self.file.path.name}")
+        told = f"the picture {name!r} of {self.file.path.name}"
+        return self.pictures.data(("image", place), data, told, plain=plain)
 
 
 def _object(source: Json, key: str) -> Json:

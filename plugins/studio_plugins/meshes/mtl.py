@@ -194,7 +194,7 @@ def _share(
 ) -> tuple[float, Texture | None]:
     """A number in 0…1, and its map, which stands in its place; the map's mean where it is one colour."""
     statement = entry.maps.get(f"map_{key}")
-    if statement is None or (image := pictures.file(statement.name)) is None:
+    if statement is None or (image := pictures.file(statement.name, plain=True)) is None:
         return min(max(entry.number(key, default), 0.0), 1.0), None
     if statement.clamped:
         notes.say(f"The picture {statement.name!r} is repeated, though the file asks to clamp it.")
@@ -208,7 +208,7 @@ def _opacity(entry: Entry, pictures: Pictures, notes: Notes) -> float:
     """From d (which wins) or Tr = 1 − d, and the mean of map_d."""
     opacity = entry.number("d", 1.0 - entry.number("tr", 0.0))
     statement = entry.maps.get("map_d")
-    if statement is not None and (image := pictures.file(statement.name)) is not None:
+    if statement is not None and (image := pictures.file(statement.name, plain=True)) is not None:
         notes.say(f"The mean of {statement.name!r} is the opacity of all of {entry.name!r}.")
         opacity *= mean_of(image, 3)
     return min(max(opacity, 0.0), 1.0)

@@ -34,17 +34,17 @@ class Pictures:
         if self._decoder is not None:
             self._decoder.close()
 
-    def file(self, name: str) -> Image | None:
-        """The picture of that name near the model."""
+    def file(self, name: str, *, plain: bool = False) -> Image | None:
+        """The picture of that name near the model; `plain`: of numbers that are no colours."""
         found = beside(self.folder, name)
         if found is None:
             self.notes.say(f"The picture {name!r} is missing; its surface has a plain colour.")
             return None
-        return self._once(found, lambda decoder: decoder.read(found))
+        return self._once((found, plain), lambda decoder: decoder.read(found, plain=plain))
 
-    def data(self, key: object, data: bytes, name: str) -> Image | None:
-        """The picture in bytes of the model itself; equal keys are one picture."""
-        return self._once(key, lambda decoder: decoder.decode(data, name))
+    def data(self, key: object, data: bytes, name: str, *, plain: bool = False) -> Image | None:
+        """The picture in bytes of the model itself; equal keys are one picture. `plain` as above."""
+        return self._once((key, plain), lambda decoder: decoder.decode(data, name, plain=plain))
 
     def _once(self, key: object, read: Callable[[ImageDecoder], Image]) -> Image | None:
         if key not in self._found:

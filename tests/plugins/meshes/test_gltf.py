@@ -229,7 +229,7 @@ def metal_and_roughness(tmp_path: Path, pixels: Any, pbr: dict[str, Any], colour
     made = square(material=0)
     pictures = [pixels] if colour is None else [pixels, colour]
     made.json |= {
-        "images": [{"bufferView": made.view(encode_png(p))} for p in pictures],
+        "images": [{"bufferView": made.view(p if isinstance(p, bytes) else encode_png(p))} for p in pictures],
         "textures": [{"source": n} for n in range(len(pictures))],
         "materials": [{"pbrMetallicRoughness": {"metallicRoughnessTexture": {"index": 0}, **pbr}}],
     }
@@ -247,6 +247,21 @@ def test_a_metallic_roughness_picture_is_one_of_each(tmp_path: Path) -> None:
         assert image.encoding == "data"
         np.testing.assert_array_equal(image.pixels[..., 0], pixels[..., channel])
     assert not any("mean" in note for note in notes)
+
+
+def test_sixteen_bits_of_metal_and_roughness_are_plain_numbers(tmp_path: Path) -> None:
+    import cv2
+
+    pixels = np.zeros((2, 2, 3), np.uint16)
+    pixels[:, 0, 1], pixels[:, 1, 1] = 16384, 49152
+    pixels[:, :, 2] = 13107
+    found, encoded = cv2.imencode(".png", pixels[:, :, ::-1])
+    assert found
+    made, _ = metal_and_roughness(tmp_path, encoded.tobytes(), {})
+    rough = made.textures["roughness"].image
+    np.testing.assert_allclose(rough.pixels[..., 0], pixels[..., 1] / 65535, atol=1e-6)
+    assert rough.encoding == "data"
+    assert made.values["metallic"] == pytest.approx(0.2)
 
 
 def test_a_channel_that_is_one_colour_is_a_number(tmp_path: Path) -> None:
