@@ -112,7 +112,7 @@ class _Tables(NamedTuple):
     first: I64
     size: I64
     levels: I64
-    uv_scale: F32
+    uv_map: F32
     pixel_angle: float
 
 
@@ -196,7 +196,7 @@ class Compositor:
         maps, out = table.maps, np.zeros((len(hits.face), table.plain.shape[1]), np.float32)
         faces = (*self._faces(surfaces, hits.view, maps), surfaces.mesh.uvs)
         looks = (maps.kind, table.plain, table.slope, maps.texels, maps.tables)
-        layout = (maps.first, maps.size, maps.levels, maps.uv_scale, _pixel_angle(hits.view))
+        layout = (maps.first, maps.size, maps.levels, maps.uv_map, _pixel_angle(hits.view))
         given = (hits.face, hits.u, hits.v, hits.distance, *faces, *looks, *layout)
         hit_coefficients(*given, out)
         return out.reshape(-1, table.width, 3)
@@ -259,7 +259,7 @@ class Compositor:
 
         def density() -> F32:
             out = np.empty(count, np.float32)
-            layout = (maps.kind, maps.size, maps.uv_scale)
+            layout = (maps.kind, maps.size, maps.uv_map)
 
             def look(start: int, stop: int) -> None:
                 corners = (mesh.positions, mesh.uvs, mesh.faces, mesh.face_material)
@@ -290,7 +290,7 @@ class Compositor:
             self._workers.run(count, VERTICES, partial(_add_light, given), job)
         if radiance.surfaces.catches.any():
             self._backdrop.light(scene, radiance, record)
-        layout = (maps.first, maps.size, maps.levels, maps.uv_scale)
+        layout = (maps.first, maps.size, maps.levels, maps.uv_map)
         return _Tables(maps.kind, record, sums, maps.texels, maps.tables, *layout, _pixel_angle(view))
 
     def _look(self, hits: Hits, surfaces: Surfaces, job: Job | None) -> _Outline:

@@ -40,7 +40,7 @@ def face_texels(
     face_material: I32,
     kind: I64,
     size: I64,
-    uv_scale: F32,
+    uv_map: F32,
     out: F32,
 ) -> None:
     """(F,) texels of the finest level along a metre of faces start … stop−1; 1 where nothing is textured."""
@@ -57,9 +57,8 @@ def face_texels(
         area = np.sqrt(nx * nx + ny * ny + nz * nz)
         au, av = np.float64(uvs[i, 0]), np.float64(uvs[i, 1])
         in_map = abs((uvs[j, 0] - au) * (uvs[k, 1] - av) - (uvs[j, 1] - av) * (uvs[k, 0] - au))
-        in_map *= abs(np.float64(uv_scale[m, 0]) * np.float64(uv_scale[m, 1])) * (
-            size[m, 0, 0] * size[m, 0, 1]
-        )
+        a, b, c, d = uv_map[m, 0], uv_map[m, 1], uv_map[m, 3], uv_map[m, 4]
+        in_map *= abs(np.float64(a) * d - np.float64(b) * c) * (size[m, 0, 0] * size[m, 0, 1])
         out[f] = min(np.sqrt(in_map / max(area, 1e-20)), 1e30)
 
 
@@ -115,9 +114,9 @@ def map_level(levels: int, footprint: float) -> int:
 
 
 @kernel
-def repeated(u: np.float32, scale: np.float32, offset: np.float32) -> np.float32:
-    """A texture coordinate in 0 … 1; 0 where it is too large for any texel."""
-    made = u * scale + offset
+def repeated(u: np.float32, v: np.float32, a: np.float32, b: np.float32, offset: np.float32) -> np.float32:
+    """A texture coordinate in 0 … 1, of a u + b v + offset; 0 where it is too large for any texel."""
+    made = u * a + v * b + offset
     made -= np.floor(made)
     return made if made >= 0 else np.float32(0)
 
@@ -182,7 +181,7 @@ def shade_hits(
     first: I64,
     size: I64,
     levels: I64,
-    uv_scale: F32,
+    uv_map: F32,
     pixel_angle: float,
     beside: F32,
     out: F32,
@@ -193,7 +192,7 @@ def shade_hits(
     shown (F, 3) and height (F,) come from `facing.shown_sides`, density (F,) from `face_texels`, record
     (V, RECORD) and sums (V, T·3) from `add_light`. Material m is of kind[m]; level l < levels[m] of its map
     starts at row first[m, l] of `texels` (R, 3) or `tables` (R, T·3) and has size[m, l] = (height, width);
-    uv_scale (M, 4) is scale and offset. pixel_angle: radians between samples.
+    uv_map (M, 6) is `Texture.affine`. pixel_angle: radians between samples.
 
     In one piece: a kernel that hands arrays to another counts their references at every call.
     """
@@ -211,12 +210,10 @@ def shade_hits(
         blue = mix(record[i, 2], record[j, 2], record[k, 2], w1, w2)
         m = face_material[f]
         if kind[m] != CONSTANT:
-            tu = repeated(
-                mix(record[i, 6], record[j, 6], record[k, 6], w1, w2), uv_scale[m, 0], uv_scale[m, 2]
-            )
-            tv = repeated(
-                mix(record[i, 7], record[j, 7], record[k, 7], w1, w2), uv_scale[m, 1], uv_scale[m, 3]
-            )
+            su = mix(record[i, 6], record[j, 6], record[k, 6], w1, w2)
+            sv = mix(record[i, 7], record[j, 7], record[k, 7], w1, w2)
+            tu = repeated(su, sv, uv_map[m, 0], uv_map[m, 1], uv_map[m, 2])
+            tv = repeated(su, sv, uv_map[m, 3], uv_map[m, 4], uv_map[m, 5])
             level = map_level(levels[m], texels_covered(distance[n], height[f], density[f], pixel_angle))
             begin, wide = first[m, level], size[m, level, 1]
             top, bottom, fy = neighbours(tv, size[m, level, 0])
@@ -284,7 +281,7 @@ def hit_coefficients(
     first: I64,
     size: I64,
     levels: I64,
-    uv_scale: F32,
+    uv_map: F32,
     pixel_angle: float,
     out: F32,
 ) -> None:
@@ -297,8 +294,10 @@ def hit_coefficients(
         if kind[m] == CONSTANT:
             continue
         i, j, k = shown[f, 0], shown[f, 1], shown[f, 2]
-        tu = repeated(mix(uvs[i, 0], uvs[j, 0], uvs[k, 0], u[n], v[n]), uv_scale[m, 0], uv_scale[m, 2])
-        tv = repeated(mix(uvs[i, 1], uvs[j, 1], uvs[k, 1], u[n], v[n]), uv_scale[m, 1], uv_scale[m, 3])
+        su = mix(uvs[i, 0], uvs[j, 0], uvs[k, 0], u[n], v[n])
+        sv = mix(uvs[i, 1], uvs[j, 1], uvs[k, 1], u[n], v[n])
+        tu = repeated(su, sv, uv_map[m, 0], uv_map[m, 1], uv_map[m, 2])
+        tv = repeated(su, sv, uv_map[m, 3], uv_map[m, 4], uv_map[m, 5])
         level = map_level(levels[m], texels_covered(distance[n], height[f], density[f], pixel_angle))
         start, high, wide = first[m, level], size[m, level, 0], size[m, level, 1]
         if kind[m] == AFFINE:

@@ -176,7 +176,7 @@ class Balls:
         """(P, 3) of the picture made small, between its texels."""
         small = self._small(texture.image)
         height, width = small.shape[:2]
-        place = uv * np.array(texture.scale, np.float32) + np.array(texture.offset, np.float32)
+        place = texture.placed(uv)
         x, y = place[:, 0] * width - 0.5, place[:, 1] * height - 0.5
         left, low = np.floor(x), np.floor(y)
         across, up = (x - left)[:, None].astype(np.float32), (y - low)[:, None].astype(np.float32)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Literal
@@ -110,11 +111,45 @@ class Image:
 
 @dataclass(frozen=True)
 class Texture:
-    """A picture laid on a surface: uv ↦ uv · scale + offset, repeated; multiplies its parameter."""
+    """A picture laid on a surface, repeated; multiplies its parameter.
+
+    uv ↦ scale · (uv, turned) + offset. Turned: the picture lies `rotation` degrees counter-clockwise about
+    the origin of uv, where one unit of v is as long as `aspect` units of u. So any size in metres can be
+    turned without being sheared, and so can what KHR_texture_transform says: −rotation, with a uniform scale.
+    """
 
     image: Image
     scale: tuple[float, float] = (1.0, 1.0)
     offset: tuple[float, float] = (0.0, 0.0)
+    rotation: float = 0.0
+    aspect: float = 1.0
+
+    @cached_property
+    def affine(self) -> tuple[float, float, float, float, float, float]:
+        """(a, b, t, c, d, s): (u, v) ↦ (a u + b v + t, c u + d v + s)."""
+        cosine, sine = _turn(self.rotation)
+        (wide, high), (t, s), aspect = self.scale, self.offset, self.aspect
+        return wide * cosine, wide * aspect * sine, t, -high * sine, high * aspect * cosine, s
+
+    def placed(self, uvs: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:
+        """(P, 2) places in the picture, not yet repeated, of texture coordinates (P, 2)."""
+        a, b, t, c, d, s = (np.float32(number) for number in self.affine)
+        u, v = uvs[:, 0], uvs[:, 1]
+        return np.stack([u * a + v * b + t, u * c + v * d + s], axis=1)
+
+    @property
+    def area(self) -> float:
+        """Of one unit of uv in the picture: how often it lies there."""
+        a, b, _, c, d, _ = self.affine
+        return abs(a * d - b * c)
+
+
+def _turn(degrees: float) -> tuple[float, float]:
+    """Cosine and sine, exact for quarters of a turn."""
+    quarters, rest = divmod(degrees, 90.0)
+    if rest == 0:
+        return ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0))[int(quarters % 4)]
+    return math.cos(math.radians(degrees)), math.sin(math.radians(degrees))
 
 
 @dataclass(frozen=True, eq=False)

@@ -36,8 +36,8 @@ class Maps:
     """Mip levels of all textured materials (M); the same object while no map changes.
 
     Level l < levels[m] of material m starts at row first[m, l] of texels (R, 3) or, where its coefficients
-    are not affine, of tables (R, T·3), and has size[m, l] = (height, width). uv_scale (M, 4) is scale and
-    offset, kind (M,) says which, as in `kernels.compose`.
+    are not affine, of tables (R, T·3), and has size[m, l] = (height, width). uv_map (M, 6) is
+    `Texture.affine`, kind (M,) says which, as in `kernels.compose`.
     """
 
     kind: I64
@@ -46,7 +46,7 @@ class Maps:
     first: I64
     size: I64
     levels: I64
-    uv_scale: F32
+    uv_map: F32
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,7 +90,7 @@ class _Look:
     typical: F32
     pyramid: _Pyramid | None
     picture: tuple[str, bool] | None
-    uv_scale: F32
+    uv_map: F32
 
 
 class CoefficientTable:
@@ -125,7 +125,7 @@ class CoefficientTable:
         resolved = resolve(bare, self._registry)  # what catches shadows shows no picture of its own
         if not resolved.textures:
             plain = coefficients(resolved).ravel()
-            none, where = np.zeros_like(plain), _uv_scale(resolved)
+            none, where = np.zeros_like(plain), _uv_map(resolved)
             return _Look(material, CONSTANT, plain, none, plain, None, None, where)
         if len(resolved.textures) == 1:
             key = _picture_key(resolved)
@@ -138,16 +138,16 @@ class CoefficientTable:
                 plain, slope = line
                 mean = np.tile(found.levels[-1].mean(axis=(0, 1), dtype=np.float32), len(plain) // 3)
                 typical = plain + slope * mean
-                return _Look(material, AFFINE, plain, slope, typical, found, key, _uv_scale(resolved))
+                return _Look(material, AFFINE, plain, slope, typical, found, key, _uv_map(resolved))
         own = _pyramid(coefficients(resolved).reshape(*_map_size(resolved), -1))
         typical = own.levels[-1].mean(axis=(0, 1), dtype=np.float32)
         none = np.zeros_like(typical)
-        return _Look(material, GENERAL, none, none, typical, own, None, _uv_scale(resolved))
+        return _Look(material, GENERAL, none, none, typical, own, None, _uv_map(resolved))
 
     def _assemble(self, looks: tuple[_Look, ...]) -> Coefficients:
         count = max(len(looks), 1)
         kind, first = np.zeros(count, np.int64), np.zeros((count, LEVELS), np.int64)
-        size, uv_scale = np.zeros((count, LEVELS, 2), np.int64), np.zeros((count, 4), np.float32)
+        size, uv_map = np.zeros((count, LEVELS, 2), np.int64), np.zeros((count, 6), np.float32)
         most = max((len(look.plain) for look in looks), default=3)
         plain, slope, typical = np.zeros((3, count, most), np.float32)
         arrays = {}
@@ -163,11 +163,11 @@ class CoefficientTable:
                     first[m, level], size[m, level] = at, values.shape[:2]
                     at += values.shape[0] * values.shape[1]
         for m, look in enumerate(looks):
-            kind[m], uv_scale[m] = look.kind, look.uv_scale
+            kind[m], uv_map[m] = look.kind, look.uv_map
             own = len(look.plain)
             plain[m, :own], slope[m, :own], typical[m, :own] = look.plain, look.slope, look.typical
         levels = (size[:, :, 0] > 0).sum(axis=1)
-        maps = Maps(kind, arrays[AFFINE], arrays[GENERAL], first, size, levels, uv_scale)
+        maps = Maps(kind, arrays[AFFINE], arrays[GENERAL], first, size, levels, uv_map)
         if self._made is not None and _same(maps, self._made[1].maps):
             maps = self._made[1].maps
         return Coefficients(plain, slope, typical, maps)
@@ -210,7 +210,7 @@ def _views(joined: F32, start: int, levels: tuple[F32, ...]) -> tuple[F32, ...]:
 def _same(a: Maps, b: Maps) -> bool:
     if a.texels is not b.texels or a.tables is not b.tables:
         return False
-    pairs = ((a.kind, b.kind), (a.first, b.first), (a.size, b.size), (a.uv_scale, b.uv_scale))
+    pairs = ((a.kind, b.kind), (a.first, b.first), (a.size, b.size), (a.uv_map, b.uv_map))
     return all(np.array_equal(x, y) for x, y in pairs)
 
 
@@ -243,10 +243,10 @@ def _map_size(resolved: Resolved) -> tuple[int, int]:
     return max(h for h, _ in sizes), max(w for _, w in sizes)
 
 
-def _uv_scale(resolved: Resolved) -> F32:
+def _uv_map(resolved: Resolved) -> F32:
     for texture in resolved.textures.values():
-        return np.array([*texture.scale, *texture.offset], np.float32)
-    return np.array([1, 1, 0, 0], np.float32)
+        return np.array(texture.affine, np.float32)
+    return np.array([1, 0, 0, 0, 1, 0], np.float32)
 
 
 def _line(resolved: Resolved, picture: _Pyramid) -> tuple[F32, F32] | None:

@@ -74,7 +74,7 @@ def resolve(material: Material, registry: Registry) -> Resolved:
         if name not in brdf.textures:
             continue
         first = next(iter(textures.values()), texture)
-        if (texture.scale, texture.offset) == (first.scale, first.offset):
+        if texture.affine == first.affine:
             textures[name] = texture
         else:
             mean = linear_rgb(texture.image).mean(axis=(0, 1), dtype=np.float64)

@@ -176,9 +176,8 @@ class ShapeTable:
         """What the pictures of a material come to at some points."""
         values, ranges = [], []
         for texture in resolved.shaping.values():
-            grey, scale = self._pictures[texture.image.key], np.array(texture.scale, np.float32)
-            at = uvs * scale + np.array(texture.offset, np.float32)
-            values.append(grey.at(at, area * np.abs(scale[0] * scale[1])))
+            grey = self._pictures[texture.image.key]
+            values.append(grey.at(texture.placed(uvs), area * np.float32(texture.area)))
             ranges.append(grey.range)
         return stepped(np.stack(values, axis=1), ranges)
 

@@ -26,8 +26,7 @@ def vertex_radiance(scene: Scene, radiance: Radiance, registry: Registry) -> npt
             weights = np.broadcast_to(table, (len(own), *table.shape))
         else:
             texture = next(iter(resolved.textures.values()))
-            uv = mesh.uvs[own] * np.array(texture.scale, np.float32) + np.array(texture.offset, np.float32)
-            weights = _bilinear(table, uv)
+            weights = _bilinear(table, texture.placed(mesh.uvs[own]))
         made[own] = (terms[own] * weights).sum(axis=1)
     return made
 

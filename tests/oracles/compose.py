@@ -41,7 +41,7 @@ class Painter:
                 levels.append(halved(levels[-1]))
             self.maps.append(levels)
             texture = next(iter(resolved.textures.values()), None)
-            self.uv.append((texture.scale, texture.offset) if texture else ((1, 1), (0, 0)))
+            self.uv.append(place_in_picture(texture) if texture else np.eye(3))
         sky = shown_environment(scene)
         self.sky = sky if sky is not None and sky.background else None
         self.sky_pixels = linear_rgb(self.sky.image).astype(np.float64) if self.sky else None
@@ -96,14 +96,15 @@ class Painter:
                 corners = mesh.back_faces[face]
             met = np.array(self.view.transform.translation) + float(hits.distance[index]) * along
             return self.photograph(along, met) * (weights @ self.lit[corners]), None
-        levels, (scale, offset) = self.maps[m], self.uv[m]
+        levels, place = self.maps[m], self.uv[m]
         footprint = None
         if len(levels) == 1:
             look = levels[0][0, 0]
         else:
-            uv = (weights @ mesh.uvs[corners].astype(np.float64)) * scale + offset
+            uv = (place @ (*(weights @ mesh.uvs[corners].astype(np.float64)), 1))[:2]
             e, f = mesh.uvs[corners[1:]].astype(np.float64) - mesh.uvs[corners[0]]
-            texels = abs(e[0] * f[1] - e[1] * f[0]) * scale[0] * scale[1] * np.prod(levels[0].shape[:2])
+            laid = abs(np.linalg.det(place[:2, :2]))
+            texels = abs(e[0] * f[1] - e[1] * f[0]) * laid * np.prod(levels[0].shape[:2])
             angle = 2 * np.tan(np.radians(self.view.fov) / 2) / (self.view.height * self.view.antialias)
             footprint = hits.distance[index] * angle * np.sqrt(texels / size) / np.sqrt(max(abs(away), 0.05))
             level = int(np.clip(np.floor(np.log2(footprint) + 0.5), 0, len(levels) - 1))
@@ -117,6 +118,15 @@ class Painter:
                 under, _ = self.sample(rest, at, sample)
                 colour = alpha * colour + (1 - alpha) * under
         return colour, footprint
+
+
+def place_in_picture(texture):
+    """(3, 3) from (u, v, 1): a stretched plane, turned back under the picture, in units of the picture."""
+    turn = np.exp(-1j * np.radians(texture.rotation))
+    back = np.array([[turn.real, -turn.imag, 0], [turn.imag, turn.real, 0], [0, 0, 1]])
+    (wide, high), (right, up) = texture.scale, texture.offset
+    size = np.array([[wide, 0, right], [0, high, up], [0, 0, 1]])
+    return size @ back @ np.diag([1, texture.aspect, 1])
 
 
 def on_dome(eye, along, radius):

@@ -104,8 +104,9 @@ def blade() -> Geometry:
 
 
 BLADE = MeshObject(id="blade", name="Blade", geometry=blade(), materials=("paint",))
-COLOURED = {"model": "ggx", "textures": frozen_map({"base_color": Texture(PICTURE, (3.0, 2.0), (0.2, 0.7))})}
-FINE = {"textures": frozen_map({"base_color": Texture(PICTURE, (40.0, -25.0))})}
+LAID = Texture(PICTURE, (3.0, 2.0), (0.2, 0.7), 25.0, 1.4)
+COLOURED = {"model": "ggx", "textures": frozen_map({"base_color": LAID})}
+FINE = {"textures": frozen_map({"base_color": Texture(PICTURE, (40.0, -25.0), rotation=-70.0)})}
 METAL = {
     "model": "ggx",
     "textures": frozen_map({"base_color": Texture(PICTURE), "metallic": Texture(GREY)}),

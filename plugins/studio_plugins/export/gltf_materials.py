@@ -11,7 +11,7 @@ any other      dielectric of roughness 1 in its mean colour, with a note
 =============  =====================================================================================
 
 Pictures of roughness and metal become the green and blue of one. All are double-sided; opacity below 1 is
-blended. Texture scale and offset become KHR_texture_transform.
+blended. How pictures lie becomes KHR_texture_transform.
 """
 
 from __future__ import annotations
@@ -62,6 +62,9 @@ class Materials:
         resolved = resolve(material, self.registry)
         if resolved.problem:
             self.notes.append(resolved.problem)
+        if any(shears(texture) for texture in (*resolved.textures.values(), *resolved.shaping.values())):
+            told = "glTF cannot turn a picture whose sides differ in scale; it is written sheared."
+            self.notes.append(f"{material.name}: {told}")
         made: Json = {"name": material.name, "doubleSided": True, "extensions": {}}
         model = resolved.brdf.id
         if model == "lambert":
@@ -158,17 +161,38 @@ class Materials:
             self.images.append({"bufferView": self.buffer.view(encode_png(pixels)), "mimeType": "image/png"})
             self.textures.append({"sampler": 0, "source": len(self.images) - 1})
         made: Json = {"index": self._pictures[key]}
-        scale, offset = texture.scale, texture.offset
-        if scale != (1.0, 1.0) or offset != (0.0, 0.0):
-            # glTF's v runs down the picture: 1 − (s v + o) = s (1 − v) + (1 − s − o).
-            moved = {"scale": list(scale), "offset": [offset[0], 1 - scale[1] - offset[1]]}
+        moved = _transform(texture)
+        if moved:
             made["extensions"] = {"KHR_texture_transform": moved}
             self.extensions.add("KHR_texture_transform")
         return made
 
 
+def _transform(texture: Texture) -> Json:
+    """KHR_texture_transform: what takes (u, 1 − v) to (place, 1 − place); empty where that is nothing.
+
+    It scales before it turns; `shears` says what it cannot.
+    """
+    a, b, t, c, d, s = texture.affine
+    if (a, b, t, c, d, s) == (1.0, 0.0, 0.0, 0.0, 1.0, 0.0):
+        return {}
+    offset = [t + b, 1 - s - d]
+    if b == 0 and c == 0:
+        return {"scale": [a, d], "offset": offset}
+    turned = math.atan2(c, a)
+    cosine, sine = math.cos(turned), math.sin(turned)
+    scale = [math.hypot(a, c), cosine * d - sine * b]
+    return {"scale": scale, "rotation": turned, "offset": offset}
+
+
+def shears(texture: Texture) -> bool:
+    """Whether a picture lies so that glTF, which scales before it turns, cannot say it."""
+    a, b, _, c, d, _ = texture.affine
+    return abs(a * b + c * d) > 1e-6 * max(math.hypot(a, c) * math.hypot(b, d), 1e-30)
+
+
 def _alike(a: Texture, b: Texture) -> bool:
-    return (a.scale, a.offset) == (b.scale, b.offset)
+    return a.affine == b.affine
 
 
 def _sized(texels: npt.NDArray[np.float32], size: tuple[int, ...]) -> npt.NDArray[np.float32]:

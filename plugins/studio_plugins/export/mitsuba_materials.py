@@ -127,11 +127,11 @@ class Materials:
         prop(made, "boolean", "raw", raw)
         prop(made, "string", "filter_type", "bilinear")
         prop(made, "string", "wrap_mode", "repeat")
-        # Mitsuba's v runs down the picture and the studio's runs up: v ↦ 1 − (scale · v + offset).
-        scale, offset = texture.scale, texture.offset
+        # Mitsuba's v runs down the picture and the studio's runs up: 1 − (c u + d v + s).
+        a, b, t, c, d, s = texture.affine
+        rows = ((a, b, 0.0, t), (-c, -d, 0.0, 1.0 - s), (0.0, 0.0, 1.0, 0.0), (0.0, 0.0, 0.0, 1.0))
         held = put(made, "transform", name="to_uv")
-        put(held, "scale").attrib.update(x=repr(scale[0]), y=repr(-scale[1]))
-        put(held, "translate").attrib.update(x=repr(offset[0]), y=repr(1 - offset[1]))
+        put(held, "matrix").attrib["value"] = " ".join(repr(number) for row in rows for number in row)
 
     def _picture(self, value: Value, texture: Texture) -> tuple[str, bool]:
         image, colour = texture.image, isinstance(value, tuple)

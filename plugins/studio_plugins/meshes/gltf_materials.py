@@ -6,6 +6,8 @@ metal; a channel that is the same all over becomes its mean.
 
 from __future__ import annotations
 
+import dataclasses
+import math
 from typing import Any
 
 import numpy as np
@@ -67,15 +69,15 @@ class GltfMaterials:
         textures: dict[str, Texture] = {}
         uv_set: int | None = None
         if image is not None and isinstance(reference, dict):
-            scale, offset, uv_set = self._placing(reference)
-            textures["base_color"] = Texture(opaque(image), scale, offset)
+            placed, uv_set = self._placing(reference, opaque(image))
+            textures["base_color"] = placed
         second = pbr.get("metallicRoughnessTexture")
         both = self._image(second, plain=True)
         if both is not None and isinstance(second, dict):
-            placing = self._placing(second)
-            means = self._vary(both, placing, uv_set, textures, name)
+            placed, own_set = self._placing(second, both)
+            means = self._vary(placed, own_set, uv_set, textures, name)
             metallic, roughness = metallic * means[0], roughness * means[1]
-            uv_set = placing[2] if uv_set is None else uv_set
+            uv_set = own_set if uv_set is None else uv_set
         for unused, word in (
             ("normalTexture", "normal"),
             ("occlusionTexture", "occlusion"),
@@ -103,30 +105,30 @@ class GltfMaterials:
 
     def _vary(
         self,
-        both: Image,
-        placing: tuple[tuple[float, float], tuple[float, float], int],
+        placed: Texture,
+        own_set: int,
         uv_set: int | None,
         textures: dict[str, Texture],
         name: str,
     ) -> tuple[float, float]:
         """Adds pictures of metal and roughness; the factors that stand for what is none (1: it is one)."""
-        scale, offset, own_set = placing
+        both = placed.image
         if uv_set is not None and own_set != uv_set:
             self.notes.say(f"The mean of the metallic-roughness picture is used for all of {name!r}.")
             return mean_of(both, 2), mean_of(both, 1)
         metal, rough = channel_of(both, 2), channel_of(both, 1)
         base = textures.get("base_color")
         if metal is not None and base is not None:
-            alike = (base.scale, base.offset) == (scale, offset)
+            alike = base.affine == placed.affine
             large = max(base.image.pixels[..., 0].size, metal.pixels.size) > MOST_TEXELS
             if large or not alike:
                 why = "is too large" if large else "lies otherwise than its colour"
                 self.notes.say(f"The picture of the metal of {name!r} {why}: its mean is used.")
                 metal = None
         if metal is not None:
-            textures["metallic"] = Texture(metal, scale, offset)
+            textures["metallic"] = dataclasses.replace(placed, image=metal)
         if rough is not None:
-            textures["roughness"] = Texture(rough, scale, offset)
+            textures["roughness"] = dataclasses.replace(placed, image=rough)
         return 1.0 if metal is not None else mean_of(both, 2), 1.0 if rough is not None else mean_of(both, 1)
 
     def _specular(self, extensions: Json) -> float:
@@ -155,19 +157,23 @@ class GltfMaterials:
         opacity *= 1.0 - self.file.floats(glass, "transmissionFactor", (0.0,))[0]
         return min(max(opacity, 0.0), 1.0)
 
-    def _placing(self, reference: Json) -> tuple[tuple[float, float], tuple[float, float], int]:
-        """Scale and offset in our uv (v up; the format's runs down), and the set of coordinates."""
+    def _placing(self, reference: Json, image: Image) -> tuple[Texture, int]:
+        """The picture laid as the reference says, and the set of coordinates.
+
+        Our v runs up, the format's down. It scales, then turns uv counter-clockwise as one sees it (the
+        picture clockwise): u' = cu + sv, v' = cv − su, as all programs do (KhronosGroup/glTF#1563).
+        """
         transform = _object(_object(reference, "extensions"), "KHR_texture_transform")
         scale_u, scale_v = self.file.floats(transform, "scale", (1.0, 1.0))
         offset_u, offset_v = self.file.floats(transform, "offset", (0.0, 0.0))
-        if self.file.floats(transform, "rotation", (0.0,))[0] != 0:
-            self.notes.say("A picture that is turned on its surface was laid on unturned.")
+        turned = math.degrees(self.file.floats(transform, "rotation", (0.0,))[0])
         uv_set = self.file.whole(reference, "texCoord", 0)
-        return (
-            (scale_u, scale_v),
-            (offset_u, 1.0 - scale_v - offset_v),
-            (self.file.whole(transform, "texCoord", uv_set)),
-        )
+        turnable = turned % 360 != 0 and scale_u != 0
+        own = (scale_u, scale_u) if turnable else (scale_u, scale_v)
+        laid = Texture(image, own, (0.0, 0.0), -turned, scale_v / scale_u if turnable else 1.0)
+        _, down, _, _, up, _ = laid.affine  # where v = 1, which the format counts from
+        laid = dataclasses.replace(laid, offset=(offset_u - down, 1.0 - offset_v - up))
+        return laid, self.file.whole(transform, "texCoord", uv_set)
 
     def _image(self, reference: object, *, plain: bool = False) -> Image | None:
         """The picture of a texture reference, None (with a note) when it cannot be had.

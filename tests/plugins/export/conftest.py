@@ -85,7 +85,7 @@ def room() -> Scene:
             id="poster",
             name="Poster",
             values={"base_color": (1.0, 1.0, 1.0)},
-            textures={"base_color": Texture(picture(), (1.5, 0.75), (0.125, 0.0625))},
+            textures={"base_color": Texture(picture(), (1.5, 1.5), (0.125, 0.0625), 20.0, 0.5)},
         ),
     ]
     tilted = Transform((0.3, 0.2, -0.4), axis_angle((1, 2, 0.5), 40), 1.5)

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 import pytest
 from oracles.gltf import check, parse, read
 
@@ -87,12 +88,31 @@ def test_texture_coordinates_meet_the_same_texel(room: Scene, host: PluginHost, 
     uv = read(document, binary, primitive["attributes"]["TEXCOORD_0"])
     info = document["materials"][primitive["material"]]["pbrMetallicRoughness"]["baseColorTexture"]
     moved = info["extensions"]["KHR_texture_transform"]
-    theirs = uv * moved["scale"] + np.array(moved["offset"])  # from the top left
+    theirs = khr_texture_transform(moved, uv)  # from the top left
     texture = room.material("poster").textures["base_color"]
     wall = room["wall"]
     assert isinstance(wall, MeshObject)
-    ours = np.asarray(wall.geometry.uvs) * texture.scale + np.array(texture.offset)  # from the bottom left
+    ours = texture.placed(np.asarray(wall.geometry.uvs))  # from the bottom left
     np.testing.assert_allclose(theirs, np.stack([ours[:, 0], 1 - ours[:, 1]], axis=1), atol=1e-6)
+
+
+def khr_texture_transform(moved: dict[str, Any], uv: npt.NDArray[np.float32]) -> npt.NDArray[np.float64]:
+    """(P, 2): scaled, then turned counter-clockwise as one sees it where v runs down, then moved."""
+    angle = moved.get("rotation", 0.0)
+    turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
+    return np.asarray((uv * moved.get("scale", 1)) @ turn.T + moved.get("offset", 0))
+
+
+def test_what_gltf_cannot_turn_is_said(room: Scene, host: PluginHost, tmp_path: Path) -> None:
+    poster = room.material("poster")
+    uneven = dataclasses.replace(poster.textures["base_color"], scale=(1.0, 3.0))
+    changed = dataclasses.replace(poster, textures={"base_color": uneven})
+    notes = exported(room.with_materials(changed), host, tmp_path)[2]
+    assert any("sheared" in note for note in notes)
+    square = dataclasses.replace(uneven, rotation=90.0)
+    changed = dataclasses.replace(poster, textures={"base_color": square})
+    notes = exported(room.with_materials(changed), host, tmp_path)[2]
+    assert not any("sheared" in note for note in notes)
 
 
 def test_lamps_are_punctual(host: PluginHost, tmp_path: Path) -> None:

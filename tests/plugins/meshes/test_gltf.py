@@ -190,8 +190,33 @@ def test_attributes_normalised_integers_sparse_values_and_uv_sets(tmp_path: Path
     np.testing.assert_allclose(geometry.uvs[corner], [0, 0.8], atol=1e-6)
     texture = model.materials[0].textures["base_color"]
     # the format's v runs down: (0, 0.2) ↦ (0.5, 0.25 + 4 · 0.2 = 1.05) from the top
-    placed = geometry.uvs[corner] * texture.scale + texture.offset
+    (placed,) = texture.placed(geometry.uvs[corner : corner + 1])
     np.testing.assert_allclose([placed[0], 1 - placed[1]], [0.5, 1.05], atol=1e-5)
+
+
+def test_turned_pictures_lie_as_in_other_programs(tmp_path: Path) -> None:
+    # the format's own example: the lower left quarter of the picture, turned clockwise by a quarter
+    moved = {"offset": [0, 1], "rotation": np.pi / 2, "scale": [0.5, 0.5]}
+    picture = square(material=0)
+    image = picture.view(encode_png(np.full((2, 2, 3), 128, np.uint8)))
+    reference = {"index": 0, "extensions": {"KHR_texture_transform": moved}}
+    picture.json["images"] = [{"bufferView": image, "mimeType": "image/png"}]
+    picture.json["textures"] = [{"source": 0}]
+    picture.json["materials"] = [{"pbrMetallicRoughness": {"baseColorTexture": reference}}]
+    texture = load(tmp_path, picture).materials[0].textures["base_color"]
+    # the surface's corners, from its upper left clockwise, meet the quarter's from its lower left clockwise
+    corners = np.array([[0, 1], [1, 1], [1, 0], [0, 0]], np.float32)
+    wanted = [[0, 0], [0, 0.5], [0.5, 0.5], [0.5, 0]]
+    np.testing.assert_allclose(texture.placed(corners), wanted, atol=1e-6)
+    assert texture.rotation == pytest.approx(-90)
+    moved |= {"scale": [2, 0.5], "rotation": 0.3, "offset": [0.25, 0.5]}
+    texture = load(tmp_path, picture).materials[0].textures["base_color"]
+    uv = np.random.default_rng(0).random((5, 2))
+    scaled = uv * [2, 0.5]
+    u = np.cos(0.3) * scaled[:, 0] + np.sin(0.3) * scaled[:, 1] + 0.25
+    v = np.cos(0.3) * scaled[:, 1] - np.sin(0.3) * scaled[:, 0] + 0.5
+    made = texture.placed(np.stack([uv[:, 0], 1 - uv[:, 1]], axis=1).astype(np.float32))
+    np.testing.assert_allclose(made, np.stack([u, 1 - v], axis=1), atol=1e-6)
 
 
 def with_material(folder: Path, **material: Any) -> tuple[Any, ImportedModel]:

@@ -118,11 +118,11 @@ def _one_triangle(kind):
     texels, tables = rng.random((21, 3)).astype(np.float32), rng.random((21, 9)).astype(np.float32)
     first, size = np.array([[0, 16, 20]]), np.array([[[4, 4], [2, 2], [1, 1]]])
     looks = (np.array([kind]), record, sums, texels, tables, first, size, np.array([3]))
-    return looks, np.array([[1, 1, 0, 0]], np.float32)
+    return looks, np.array([[1, 0, 0, 0, 1, 0]], np.float32)
 
 
 def _shade(kind, face=0, corners=(0, 1, 2), distance=1.0, beside=NO_COLOUR):
-    looks, uv_scale = _one_triangle(kind)
+    looks, uv_map = _one_triangle(kind)
     out = np.full((1, 3), -1, np.float32)
     shade_hits(
         0,
@@ -136,7 +136,7 @@ def _shade(kind, face=0, corners=(0, 1, 2), distance=1.0, beside=NO_COLOUR):
         np.array([2.0], np.float32),
         np.zeros(1, np.int32),
         *looks,
-        uv_scale,
+        uv_map,
         0.01,
         beside,
         out,
@@ -212,7 +212,10 @@ def test_texels_along_a_metre_are_those_of_the_finest_level():
     uvs = np.array([[0, 0], [1, 0], [0, 1], [0.5, 0]], np.float32)
     faces = np.array([[0, 1, 2], [0, 0, 1], [0, 1, 2], [0, 3, 2]], np.uint32)
     material = np.array([0, 0, 1, 0], np.int32)
-    size, scale = np.array([[[32, 8]], [[0, 0]]]), np.array([[2, -3, 0, 0], [1, 1, 0, 0]], np.float32)
+    size, scale = (
+        np.array([[[32, 8]], [[0, 0]]]),
+        np.array([[2, 1, 0, 3, -1.5, 0], [1, 0, 0, 0, 1, 0]], np.float32),
+    )
     out = np.empty(4, np.float32)
     for start, stop in ((0, 3), (3, 4)):
         face_texels(start, stop, places, uvs, faces, material, np.array([AFFINE, CONSTANT]), size, scale, out)

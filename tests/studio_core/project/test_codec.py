@@ -107,6 +107,24 @@ def test_equal_meshes_and_pictures_become_one_object() -> None:
     assert paint.textures["colour"].image is light.image
 
 
+def test_how_a_picture_lies_is_kept_and_older_files_lay_it_straight() -> None:
+    sky = Image(np.ones((2, 4, 3), np.float32))
+    laid = Texture(sky, (2.0, 3.0), (0.1, 0.2), 30.0, 1.5)
+    paint = dataclasses.replace(PAINT, textures=frozen_map({"colour": laid}))
+    (made,) = back(paint)
+    assert made.textures["colour"].affine == laid.affine
+    text, blobs_ = codec.encode_item(paint)
+    written = loads(text, "an item")
+    for name in ("rotation", "aspect"):
+        del written["textures"]["colour"][name]
+    packed = {
+        b.ref.blob: (b.ref, [bytes(p) for p in blobs.pack(b.array, b.ref, squeeze=b.squeeze)]) for b in blobs_
+    }
+    inward = codec.Inward(lambda ref, part, squeezed: blobs.unpack(ref, iter(packed[ref.blob][1]), part))
+    older = inward.item(written, "an item")
+    assert older.textures["colour"].affine == (2.0, 0.0, 0.1, 0.0, 3.0, 0.2)
+
+
 def test_equal_tables_become_one_object_and_damaged_ones_are_refused() -> None:
     values = np.random.default_rng(0).random((3, 4, 5, 3), dtype=np.float32)
     measured = dataclasses.replace(PAINT, tables=frozen_map({"measurement": Table(values, "Felt")}))

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scenes import cube, floor
 
-from studio_core.scene.geometry import Geometry, Image
+from studio_core.scene.geometry import Geometry, Image, Texture
 
 TRIANGLE = np.array([(0, 0, 0), (1, 0, 0), (0, 1, 0)], np.float32)
 FACE = np.array([(0, 1, 2)], np.uint32)
@@ -84,3 +84,22 @@ def test_a_picture_is_finite(bad: float) -> None:
     pixels[1, 2, 0] = bad
     with pytest.raises(ValueError, match="finite"):
         Image(pixels)
+
+
+def test_a_picture_is_turned_without_being_sheared():
+    # 0.5 × 0.2 m on a surface whose u runs 2 m and whose v runs 3 m a unit, turned by 30°
+    picture = Image(np.zeros((2, 5, 3), np.float32))
+    laid = Texture(picture, (2 / 0.5, 2 / 0.2), (0.25, 0.5), 30.0, 3 / 2)
+    turn = np.array([[np.cos(np.pi / 6), -np.sin(np.pi / 6)], [np.sin(np.pi / 6), np.cos(np.pi / 6)]])
+    in_picture = np.random.default_rng(1).uniform(-2, 2, (20, 2))
+    metres = ((in_picture - [0.25, 0.5]) * [0.5, 0.2]) @ turn.T
+    uvs = (metres / [2, 3]).astype(np.float32)
+    np.testing.assert_allclose(laid.placed(uvs), in_picture, atol=1e-5)
+    assert laid.area == pytest.approx(2 * 3 / (0.5 * 0.2))
+
+
+def test_quarters_of_a_turn_are_exact():
+    picture = Image(np.zeros((2, 2, 3), np.float32))
+    assert Texture(picture, (2.0, 3.0), rotation=90.0).affine == (0.0, 2.0, 0.0, -3.0, 0.0, 0.0)
+    assert Texture(picture, (2.0, 3.0), rotation=-180.0).affine == (-2.0, 0.0, 0.0, 0.0, -3.0, 0.0)
+    assert Texture(picture, (2.0, 3.0), (0.5, 0.0)).affine == (2.0, 0.0, 0.5, 0.0, 3.0, 0.0)

@@ -100,7 +100,7 @@ def test_a_colour_keeps_the_maps_and_another_picture_does_not(host):
     shifted = dataclasses.replace(other, textures={"base_color": Texture(OTHER, (2.0, 2.0))})
     fourth = table_of(host, shifted, plain, keeper=keeper)
     assert fourth.maps.texels is third.maps.texels
-    assert not np.array_equal(fourth.maps.uv_scale, third.maps.uv_scale)
+    assert not np.array_equal(fourth.maps.uv_map, third.maps.uv_map)
 
 
 def test_one_picture_on_two_materials_is_stored_once(host):

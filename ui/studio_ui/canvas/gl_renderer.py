@@ -223,7 +223,7 @@ class Renderer:
         if atlas is None:
             return
         program["a_uv"] = body.shape.uvs.buffer
-        program["u_uv_scale"] = batch.uv_scale
+        program["u_uv_u"], program["u_uv_v"] = batch.uv_map[:3], batch.uv_map[3:]
         program["u_finest"] = atlas.finest
         program["u_levels"] = float(atlas.levels)
         program["u_atlas"] = atlas.size

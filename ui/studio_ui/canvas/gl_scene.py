@@ -36,7 +36,7 @@ class Batch:
     kind: int
     opacity: float
     atlas: Atlas | None
-    uv_scale: tuple[float, ...]
+    uv_map: tuple[float, ...]
 
 
 @dataclass(eq=False)
@@ -195,14 +195,14 @@ class GlScene:
         shape.forget(KEPT - 1)
         made: list[Batch] = []
         for look in dict.fromkeys(looks.values()):
-            kind, atlas, uv_scale, opacity = look
+            kind, atlas, uv_map, opacity = look
             chosen = np.isin(materials, [m for m in used if looks[m] == look])
             sided = mesh.back_faces[:, 0] != NO_BACK
             single = mesh.faces[chosen & ~sided]
             double = np.concatenate([mesh.faces[chosen & sided], mesh.back_faces[chosen & sided][:, ::-1]])
             for faces, culled in ((double, True), (single, False)):
                 if len(faces):
-                    made.append(Batch(self._indices(faces), culled, kind, opacity, atlas, uv_scale))
+                    made.append(Batch(self._indices(faces), culled, kind, opacity, atlas, uv_map))
         shape.lists[key] = mesh, tuple(made)  # holds the mesh, so that the key stays its own
         return tuple(made)
 
@@ -216,7 +216,7 @@ class GlScene:
             return CAUGHT, None, (), alpha
         if own == CONSTANT:
             return own, None, (), alpha
-        return own, self.atlases[material], tuple(maps.uv_scale[material].tolist()), alpha
+        return own, self.atlases[material], tuple(maps.uv_map[material].tolist()), alpha
 
     def _indices(self, faces: U32) -> Any:
         flat = np.ascontiguousarray(faces, np.uint32).reshape(-1)

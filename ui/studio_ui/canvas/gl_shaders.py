@@ -52,14 +52,15 @@ EACH    v_sum@ = a_sum@;
 """
 
 _MAPS = """
-uniform vec4 u_uv_scale;       // scale and offset
+uniform vec3 u_uv_u;           // place in the picture: two rows on (u, v, 1)
+uniform vec3 u_uv_v;
 uniform vec2 u_finest;         // size of the finest level, texels
 uniform float u_levels;
 uniform vec2 u_atlas;          // size
 uniform float u_pixel_angle;
 
-float repeated(float u, float scale, float offset) {
-    float made = u * scale + offset;
+float repeated(vec2 uv, vec3 row) {
+    float made = uv.x * row.x + uv.y * row.y + row.z;
     return made - floor(made);
 }
 
@@ -80,8 +81,9 @@ vec4 map_level(vec2 uv) {
     vec3 across = dFdx(v_eye), down = dFdy(v_eye);
     vec3 normal = cross(across, down);
     float area = max(length(normal), 1e-30);
-    vec2 du = dFdx(uv) * u_uv_scale.xy, dv = dFdy(uv) * u_uv_scale.xy;
-    float in_map = abs(du.x * dv.y - du.y * dv.x) * u_finest.x * u_finest.y;
+    vec2 du = dFdx(uv), dv = dFdy(uv);
+    float laid = abs(u_uv_u.x * u_uv_v.y - u_uv_u.y * u_uv_v.x);
+    float in_map = abs(du.x * dv.y - du.y * dv.x) * laid * u_finest.x * u_finest.y;
     float away = max(length(v_eye), 1e-30);
     float cosine = max(abs(dot(normal, v_eye)) / (area * away), 0.05);
     float footprint = away * u_pixel_angle * sqrt(in_map / area) / sqrt(cosine);
@@ -90,7 +92,7 @@ vec4 map_level(vec2 uv) {
 }
 
 vec3 texel(sampler2D map, vec4 level, vec2 uv) {
-    vec2 at = vec2(repeated(uv.x, u_uv_scale.x, u_uv_scale.z), repeated(uv.y, u_uv_scale.y, u_uv_scale.w));
+    vec2 at = vec2(repeated(uv, u_uv_u), repeated(uv, u_uv_v));
     vec2 place = at * level.zw - 0.5;
     vec2 low = floor(place), part = place - low;
     vec2 high = low + 1.0;

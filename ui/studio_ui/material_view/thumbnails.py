@@ -79,7 +79,7 @@ def _look(material: Material) -> Hashable:
     """All that its ball depends on; pictures by identity, for hashing their pixels would take long."""
     values = tuple(sorted(material.values.items(), key=lambda item: item[0]))
     textures = tuple(
-        (name, weakref.ref(one.image), one.scale, one.offset)
+        (name, weakref.ref(one.image), one.affine)
         for name, one in sorted(material.textures.items(), key=lambda item: item[0])
     )
     tables = tuple((name, weakref.ref(table)) for name, table in sorted(material.tables.items()))
