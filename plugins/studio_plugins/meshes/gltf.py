@@ -39,7 +39,7 @@ Placed = tuple[Geometry, tuple[float, float, float], tuple[str, ...]]
 
 
 class GltfImporter:
-    """glTF 2.0, as text with its buffers or as one binary file."""
+    """glTF 2.0, as text with its buffers or as one binary file; it may hold materials alone."""
 
     label = "glTF"
     extensions = (".glb", ".gltf")
@@ -49,7 +49,10 @@ class GltfImporter:
         notes = Notes()
         file = GltfFile(path, read_bytes(path))
         with Pictures(path, notes) as pictures:
-            reader = _Reader(file, GltfMaterials(file, pictures, notes), unit, notes)
+            found = GltfMaterials(file, pictures, notes)
+            if not file.list_of("meshes") and file.list_of("materials"):
+                return ImportedModel((), found.every(), notes.told())
+            reader = _Reader(file, found, unit, notes)
             nodes = reader.read()
         used = {material for node in nodes if isinstance(node, MeshObject) for material in node.materials}
         materials = tuple(m for m in reader.materials.made.values() if m.id in used)

@@ -1,26 +1,39 @@
-"""Materials of glTF 2.0 as ours: metallic-roughness is GGX; glass is seen through by its transmission.
+"""Materials of glTF 2.0 as ours: read as a `Surface`, for which the core finds the nearest model.
 
 The green channel of a metallic-roughness picture becomes a picture of the roughness, the blue one of the
-metal; a channel that is the same all over becomes its mean.
+metal; a channel that is the same all over becomes its mean. Glass is seen through by its transmission.
 """
 
 from __future__ import annotations
 
-import dataclasses
 import math
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
+from studio_core.arrays import frozen_map
 from studio_core.errors import InputError
-from studio_core.params import Value
+from studio_core.exchange.incoming import material_of
+from studio_core.exchange.surface import Surface, times
+from studio_core.params import Colour
 from studio_core.scene.geometry import Image, Texture
 from studio_core.scene.nodes import Material, new_id
 from studio_plugins.meshes.common import PLAIN_GREY, Notes, colour
 from studio_plugins.meshes.gltf_file import GltfFile, Json, as_index
 from studio_plugins.meshes.pictures import Pictures, channel_of, mean_of, opaque
 
-MOST_TEXELS = 1 << 22  # of pictures of colour and metal together: a table of coefficients takes 48 bytes each
+_READ = (
+    "KHR_materials_anisotropy",
+    "KHR_materials_clearcoat",
+    "KHR_materials_emissive_strength",
+    "KHR_materials_ior",
+    "KHR_materials_pbrSpecularGlossiness",
+    "KHR_materials_sheen",
+    "KHR_materials_specular",
+    "KHR_materials_transmission",
+    "KHR_materials_unlit",
+)
 
 
 class GltfMaterials:
@@ -43,6 +56,10 @@ class GltfMaterials:
             self.made[index], self.uv_sets[index] = self._make(source, index)
         return self.made[index], self.uv_sets[index]
 
+    def every(self) -> tuple[Material, ...]:
+        """All materials of the file."""
+        return tuple(self.get(index)[0] for index in range(len(self.file.list_of("materials"))))
+
     def _default(self) -> Material:
         """Matte grey: the format's own default is a white metal, which nobody means by leaving it out."""
         return Material(id=new_id("material"), name="Plain", values={"base_color": (PLAIN_GREY,) * 3})
@@ -51,33 +68,87 @@ class GltfMaterials:
         name = source.get("name")
         name = name if isinstance(name, str) and name else f"Material {index + 1}"
         extensions = _object(source, "extensions")
+        slots = _Slots(self, name)
+        surface, image = self._base(source, extensions, slots)
+        surface = self._layers(surface, extensions, slots)
+        self._unused(source, extensions, name)
+        alpha = self._opacity(source, extensions, surface.opacity, image, name)
+        surface = replace(surface, name=name, opacity=alpha, textures=frozen_map(slots.textures))
+        return material_of(surface, self.notes.say), slots.uv_set or 0
+
+    def _base(self, source: Json, extensions: Json, slots: _Slots) -> tuple[Surface, Image | None]:
+        """Colour (its alpha as opacity), metal and roughness, and the picture of the colour."""
         glossy = _object(extensions, "KHR_materials_pbrSpecularGlossiness")
-        pbr = _object(source, "pbrMetallicRoughness")
+        pbr, key, metallic = _object(source, "pbrMetallicRoughness"), "baseColorTexture", 0.0
         if glossy and not pbr:
-            self.notes.say(f"The specular-glossiness material {name!r} became metallic-roughness.")
+            self.notes.say(f"The specular-glossiness material {slots.name!r} became metallic-roughness.")
             factor = self.file.floats(glossy, "diffuseFactor", (1.0,) * 4)
-            metallic, key = 0.0, "diffuseTexture"
             roughness = 1.0 - self.file.floats(glossy, "glossinessFactor", (1.0,))[0]
-            pbr = glossy
+            pbr, key = glossy, "diffuseTexture"
         else:
             factor = self.file.floats(pbr, "baseColorFactor", (1.0,) * 4)
-            metallic = self.file.floats(pbr, "metallicFactor", (1.0,))[0]
-            roughness = self.file.floats(pbr, "roughnessFactor", (1.0,))[0]
-            key = "baseColorTexture"
-        reference = pbr.get(key)
-        image = self._image(reference)
-        textures: dict[str, Texture] = {}
-        uv_set: int | None = None
-        if image is not None and isinstance(reference, dict):
-            placed, uv_set = self._placing(reference, opaque(image))
-            textures["base_color"] = placed
+            metallic = self._share(pbr, "metallicFactor", 1.0)
+            roughness = self._share(pbr, "roughnessFactor", 1.0)
+        image = slots.colour(pbr.get(key), "base_color")
         second = pbr.get("metallicRoughnessTexture")
-        both = self._image(second, plain=True)
-        if both is not None and isinstance(second, dict):
-            placed, own_set = self._placing(second, both)
-            means = self._vary(placed, own_set, uv_set, textures, name)
-            metallic, roughness = metallic * means[0], roughness * means[1]
-            uv_set = own_set if uv_set is None else uv_set
+        metallic *= slots.number(second, "metallic", 2)
+        roughness *= slots.number(second, "roughness", 1)
+        made = Surface(
+            base_color=colour(factor[:3]),
+            metallic=_unit(metallic),
+            roughness=_unit(roughness),
+            opacity=factor[3],
+        )
+        return made, image
+
+    def _layers(self, surface: Surface, extensions: Json, slots: _Slots) -> Surface:
+        """What the extensions add: index and reflectance, grain, sheen, coat."""
+        made: dict[str, Any] = {}
+        ior = self.file.floats(_object(extensions, "KHR_materials_ior"), "ior", (1.5,))[0]
+        made["ior"] = (
+            ior if ior >= 1 else 1e3 if ior == 0 else 1.5
+        )  # 0: reflects everything, by the extension
+        told = _object(extensions, "KHR_materials_specular")
+        if told:
+            factor = self._share(told, "specularFactor", 1.0)
+            made["specular"] = factor * slots.number(told.get("specularTexture"), "specular", 3)
+            tint = self.file.floats(told, "specularColorFactor", (1.0,) * 3)
+            strongest = max(*tint, 1.0)
+            if strongest > 1:  # more than the index says: then the index is higher
+                f0 = min(((made["ior"] - 1) / (made["ior"] + 1)) ** 2 * strongest, 1.0)
+                made["ior"] = (1 + f0**0.5) / max(1 - f0**0.5, 1e-3)
+            made["specular_color"] = colour([t / strongest for t in tint])
+            slots.colour(told.get("specularColorTexture"), "specular_color")
+            made["specular_color"] = slots.factored("specular_color", made["specular_color"])
+        told = _object(extensions, "KHR_materials_anisotropy")
+        if told:
+            made["anisotropy"] = self._share(told, "anisotropyStrength", 0.0)
+            turn = self.file.floats(told, "anisotropyRotation", (0.0,))[0]
+            made["anisotropy_rotation"] = math.degrees(turn)
+            if "anisotropyTexture" in told:
+                self.notes.say(f"The picture of the grain of {slots.name!r} is not used.")
+        told = _object(extensions, "KHR_materials_sheen")
+        if told:
+            made["sheen_color"] = colour(self.file.floats(told, "sheenColorFactor", (0.0,) * 3))
+            slots.colour(told.get("sheenColorTexture"), "sheen_color")
+            made["sheen_color"] = slots.factored("sheen_color", made["sheen_color"])
+            rough = self._share(told, "sheenRoughnessFactor", 0.0)
+            made["sheen_roughness"] = rough * slots.number(
+                told.get("sheenRoughnessTexture"), "sheen_roughness", 3
+            )
+        told = _object(extensions, "KHR_materials_clearcoat")
+        if told:
+            coat = self._share(told, "clearcoatFactor", 0.0)
+            made["clearcoat"] = coat * slots.number(told.get("clearcoatTexture"), "clearcoat", 0)
+            rough = self._share(told, "clearcoatRoughnessFactor", 0.0)
+            made["clearcoat_roughness"] = rough * slots.number(
+                told.get("clearcoatRoughnessTexture"), "clearcoat_roughness", 1
+            )
+            if "clearcoatNormalTexture" in told:
+                self.notes.say(f"The clear coat's normal map of {slots.name!r} is not used.")
+        return replace(surface, **made)
+
+    def _unused(self, source: Json, extensions: Json, name: str) -> None:
         for unused, word in (
             ("normalTexture", "normal"),
             ("occlusionTexture", "occlusion"),
@@ -87,56 +158,16 @@ class GltfMaterials:
                 self.notes.say(f"The {word} map of {name!r} is not used.")
         if max(self.file.floats(source, "emissiveFactor", (0.0,) * 3)) > 0:
             self.notes.say(f"The material {name!r} shines by itself; add a lamp for its light.")
-        values: dict[str, Value] = {
-            "base_color": colour(factor[:3]),
-            "metallic": min(max(metallic, 0.0), 1.0),
-            "roughness": min(max(roughness, 0.0), 1.0),
-            "specular": self._specular(extensions),
-        }
-        material = Material(
-            id=new_id("material"),
-            name=name,
-            model="ggx",
-            values=values,
-            textures=textures,
-            opacity=self._opacity(source, extensions, factor[3], image, name),
-        )
-        return material, uv_set or 0
+        if "KHR_materials_unlit" in extensions:
+            self.notes.say(
+                f"The material {name!r} shows its colour without light in the file; here it is lit."
+            )
+        for extension in extensions:
+            if extension not in _READ:
+                self.notes.say(f"{extension[:60]} of {name!r} is not used.")
 
-    def _vary(
-        self,
-        placed: Texture,
-        own_set: int,
-        uv_set: int | None,
-        textures: dict[str, Texture],
-        name: str,
-    ) -> tuple[float, float]:
-        """Adds pictures of metal and roughness; the factors that stand for what is none (1: it is one)."""
-        both = placed.image
-        if uv_set is not None and own_set != uv_set:
-            self.notes.say(f"The mean of the metallic-roughness picture is used for all of {name!r}.")
-            return mean_of(both, 2), mean_of(both, 1)
-        metal, rough = channel_of(both, 2), channel_of(both, 1)
-        base = textures.get("base_color")
-        if metal is not None and base is not None:
-            alike = base.affine == placed.affine
-            large = max(base.image.pixels[..., 0].size, metal.pixels.size) > MOST_TEXELS
-            if large or not alike:
-                why = "is too large" if large else "lies otherwise than its colour"
-                self.notes.say(f"The picture of the metal of {name!r} {why}: its mean is used.")
-                metal = None
-        if metal is not None:
-            textures["metallic"] = dataclasses.replace(placed, image=metal)
-        if rough is not None:
-            textures["roughness"] = dataclasses.replace(placed, image=rough)
-        return 1.0 if metal is not None else mean_of(both, 2), 1.0 if rough is not None else mean_of(both, 1)
-
-    def _specular(self, extensions: Json) -> float:
-        """Ours is F0 / 0.08; from the index of refraction (1.5 gives 0.5) and the specular factor."""
-        ior = self.file.floats(_object(extensions, "KHR_materials_ior"), "ior", (1.5,))[0]
-        factor = self.file.floats(_object(extensions, "KHR_materials_specular"), "specularFactor", (1.0,))[0]
-        f0 = ((ior - 1) / (ior + 1)) ** 2 if ior >= 1 else 0.04
-        return min(max(f0 / 0.08 * factor, 0.0), 1.0)
+    def _share(self, source: Json, key: str, default: float) -> float:
+        return _unit(self.file.floats(source, key, (default,))[0])
 
     def _opacity(self, source: Json, extensions: Json, alpha: float, image: Image | None, name: str) -> float:
         mode = source.get("alphaMode", "OPAQUE")
@@ -155,9 +186,11 @@ class GltfMaterials:
                 opacity = 1.0 if alpha >= self.file.floats(source, "alphaCutoff", (0.5,))[0] else 0.0
         glass = _object(extensions, "KHR_materials_transmission")
         opacity *= 1.0 - self.file.floats(glass, "transmissionFactor", (0.0,))[0]
-        return min(max(opacity, 0.0), 1.0)
+        if "transmissionTexture" in glass:
+            self.notes.say(f"The picture of the transmission of {name!r} is not used.")
+        return _unit(opacity)
 
-    def _placing(self, reference: Json, image: Image) -> tuple[Texture, int]:
+    def placing(self, reference: Json, image: Image) -> tuple[Texture, int]:
         """The picture laid as the reference says, and the set of coordinates.
 
         Our v runs up, the format's down. It scales, then turns uv counter-clockwise as one sees it (the
@@ -172,10 +205,10 @@ class GltfMaterials:
         own = (scale_u, scale_u) if turnable else (scale_u, scale_v)
         laid = Texture(image, own, (0.0, 0.0), -turned, scale_v / scale_u if turnable else 1.0)
         _, down, _, _, up, _ = laid.affine  # where v = 1, which the format counts from
-        laid = dataclasses.replace(laid, offset=(offset_u - down, 1.0 - offset_v - up))
+        laid = replace(laid, offset=(offset_u - down, 1.0 - offset_v - up))
         return laid, self.file.whole(transform, "texCoord", uv_set)
 
-    def _image(self, reference: object, *, plain: bool = False) -> Image | None:
+    def image(self, reference: object, *, plain: bool = False) -> Image | None:
         """The picture of a texture reference, None (with a note) when it cannot be had.
 
         `plain`: its numbers are no colours.
@@ -202,6 +235,56 @@ class GltfMaterials:
             return None
         told = f"the picture {name!r} of {self.file.path.name}"
         return self.pictures.data(("image", place), data, told, plain=plain)
+
+
+@dataclass
+class _Slots:
+    """The pictures of one material, all with the texture coordinates of the first."""
+
+    reader: GltfMaterials
+    name: str
+    textures: dict[str, Texture] = field(default_factory=dict)
+    means: dict[str, Texture] = field(default_factory=dict)
+    uv_set: int | None = None
+
+    def colour(self, reference: object, target: str) -> Image | None:
+        """Take a picture of colours; it as it was, alpha included."""
+        image = self.reader.image(reference)
+        if image is not None and isinstance(reference, dict):
+            placed, own_set = self.reader.placing(reference, opaque(image))
+            (self.textures if self._fits(own_set, target) else self.means)[target] = placed
+        return image
+
+    def factored(self, target: str, value: Colour) -> Colour:
+        """A colour times the mean of its picture, where that one could not be laid."""
+        return times(value, self.means[target]) if target in self.means else value
+
+    def number(self, reference: object, target: str, channel: int) -> float:
+        """Take one channel as numbers; the factor that stands for what is no picture (1: it is one)."""
+        image = self.reader.image(reference, plain=True)
+        if image is None or not isinstance(reference, dict):
+            return 1.0
+        if channel == 3 and image.pixels.shape[2] < 4:
+            return 1.0
+        placed, own_set = self.reader.placing(reference, image)
+        found = channel_of(image, channel)
+        if found is None or not self._fits(own_set, target):
+            return mean_of(image, channel)
+        self.textures[target] = replace(placed, image=found)
+        return 1.0
+
+    def _fits(self, own_set: int, target: str) -> bool:
+        if self.uv_set is None:
+            self.uv_set = own_set
+        if own_set == self.uv_set:
+            return True
+        word = target.replace("_", " ")
+        self.reader.notes.say(f"The mean of the picture of the {word} is used for all of {self.name!r}.")
+        return False
+
+
+def _unit(value: float) -> float:
+    return min(max(value, 0.0), 1.0)
 
 
 def _object(source: Json, key: str) -> Json:

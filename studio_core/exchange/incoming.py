@@ -1,0 +1,258 @@
+"""From what a file says about a surface to the model of ours that comes nearest, with what is lost.
+
+=================================================  ====================================================
+surface                                            model
+=================================================  ====================================================
+metallic-roughness, index up to 1.79               ggx, exactly
+no reflection at all                               lambert; oren-nayar where the matte part is rough
+dielectric under a clear coat                      plastic: the coat on the base's colour
+reflection weakened, or an index beyond 1.79       plastic: its gloss and index
+black and no metal                                 ggx-dielectric
+metal with a tint of the rim                       ggx-conductor
+metal with a grain                                 ward
+=================================================  ====================================================
+
+Pictures of what a model has as one number become their mean. Everything that is left out is said.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from studio_core.arrays import frozen_map
+from studio_core.exchange.surface import NORMAL, WHITE, Surface, alike, times
+from studio_core.params import Colour, Value
+from studio_core.scene.geometry import Texture
+from studio_core.scene.nodes import Material, new_id
+
+MOST_TEXELS = 1 << 22
+"""Of pictures of colour and metal together: a table of coefficients takes 48 bytes each."""
+HIGHEST_F0 = 0.08
+LEAST_GRAIN = 0.05
+COAT_COUNTS = 0.5
+Say = Callable[[str], None]
+
+_WORDS = {
+    "base_color": "colour",
+    "metallic": "metal",
+    "roughness": "roughness",
+    "specular": "reflectance",
+    "specular_color": "reflection's colour",
+    "sheen_color": "sheen",
+    "sheen_roughness": "sheen's roughness",
+    "clearcoat": "clear coat",
+    "clearcoat_roughness": "clear coat's roughness",
+    "anisotropy": "grain",
+    "diffuse_roughness": "matte part's roughness",
+    "edge_tint": "rim's tint",
+    "opacity": "opacity",
+}
+
+
+def material_of(surface: Surface, say: Say) -> Material:
+    """A new material; what its model cannot express goes to `say`, a sentence each."""
+    return _Choice(surface, say).material()
+
+
+@dataclass
+class _Choice:
+    surface: Surface
+    say: Say
+
+    def material(self) -> Material:
+        s = self.surface
+        textures = s.textures
+        black = max(s.base_color) == 0 and "base_color" not in textures
+        metal = s.metallic >= 0.5 or "metallic" in textures
+        shaped = "roughness" in textures
+        f0 = s.f0 * s.specular * max(s.specular_color)
+        if s.specular <= 0 and s.metallic <= 0 and s.clearcoat < COAT_COUNTS:
+            return self._matte()
+        if s.metallic >= 0.5 and s.anisotropy > LEAST_GRAIN:
+            return self._brushed()
+        if s.metallic >= 0.99 and s.edge_tint != WHITE:
+            return self._conductor()
+        if s.clearcoat >= COAT_COUNTS and not metal:
+            return self._coated()
+        if black and s.metallic <= 0:
+            return self._clear()
+        if not metal and not shaped and (s.specular < 1 or f0 > HIGHEST_F0 + 1e-9):
+            return self._glossy()
+        return self._ggx(f0)
+
+    def _matte(self) -> Material:
+        s = self.surface
+        values: dict[str, Value] = {"base_color": s.base_color}
+        model = "lambert"
+        if s.diffuse_roughness > 0:
+            model = "oren-nayar"
+            values["roughness"] = s.diffuse_roughness
+        return self._made(model, values, {"base_color": "base_color"}, "diffuse_roughness")
+
+    def _ggx(self, f0: float) -> Material:
+        s = self.surface
+        if s.metallic < 1 or "metallic" in s.textures:
+            if s.specular < 1:
+                self._tell("its weakened reflection keeps its full strength at the rim")
+            if f0 > HIGHEST_F0 + 1e-9:
+                self._tell(f"it reflects {HIGHEST_F0:.0%} head-on instead of {f0:.0%}")
+            if s.specular_color != WHITE:
+                self._tell("the colour of its reflection became grey")
+        grey = sum(s.specular_color) / 3
+        values: dict[str, Value] = {
+            "base_color": s.base_color,
+            "metallic": s.metallic,
+            "roughness": s.roughness,
+            "specular": min(s.f0 * s.specular * grey / HIGHEST_F0, 1.0),
+        }
+        known = {name: name for name in ("base_color", "metallic", "roughness", "specular")}
+        return self._made("ggx", values, known, "specular_color")
+
+    def _glossy(self) -> Material:
+        s = self.surface
+        if s.specular_color != WHITE:
+            self._tell("the colour of its reflection became white")
+        values: dict[str, Value] = {
+            "base_color": s.base_color,
+            "roughness": s.roughness,
+            "ior": min(max(s.ior, 1.01), 3.0),
+            "gloss": s.specular,
+            "depth": 0.0,
+        }
+        if s.ior > 3:
+            self._tell(f"its index of refraction became 3 instead of {s.ior:.3g}")
+        known = {"base_color": "base_color", "specular": "gloss"}
+        return self._made("plastic", values, known, "specular_color")
+
+    def _coated(self) -> Material:
+        s = self.surface
+        if s.clearcoat < 1:
+            self._tell("its clear coat lies on all of it, thinned")
+        if s.specular > 0:
+            self._tell("what lies below its clear coat is matte")
+        values: dict[str, Value] = {
+            "base_color": s.base_color,
+            "roughness": s.clearcoat_roughness,
+            "ior": 1.5,
+            "gloss": s.clearcoat,
+            "depth": 0.0,
+        }
+        known = {"base_color": "base_color", "clearcoat": "gloss"}
+        told = (
+            "clearcoat",
+            "clearcoat_roughness",
+            "roughness",
+            "specular",
+            "specular_color",
+            "ior",
+            "metallic",
+        )
+        return self._made("plastic", values, known, *told)
+
+    def _clear(self) -> Material:
+        s = self.surface
+        if s.ior > 3:
+            self._tell(f"its index of refraction became 3 instead of {s.ior:.3g}")
+        red, green, blue = (s.specular * c for c in s.specular_color)
+        tint: Colour = (red, green, blue)
+        values: dict[str, Value] = {"tint": tint, "ior": min(max(s.ior, 1.01), 3.0), "roughness": s.roughness}
+        return self._made(
+            "ggx-dielectric", values, {"specular_color": "tint"}, "base_color", "specular_color"
+        )
+
+    def _conductor(self) -> Material:
+        s = self.surface
+        values: dict[str, Value] = {
+            "base_color": s.base_color,
+            "edge_tint": s.edge_tint,
+            "roughness": s.roughness,
+        }
+        known = {"base_color": "base_color", "edge_tint": "edge_tint"}
+        return self._made(
+            "ggx-conductor", values, known, "metallic", "edge_tint", "specular", "specular_color"
+        )
+
+    def _brushed(self) -> Material:
+        s = self.surface
+        wide, narrow = s.alphas
+        ratio = narrow / max(wide, 1e-9)
+        if ratio < 0.1:
+            self._tell("its highlight became ten times as long as wide")
+        self._tell("metal with a grain has no brighter rim here")
+        if s.metallic < 1:
+            self._tell("it became metal altogether")
+        values: dict[str, Value] = {
+            "diffuse": (0.0, 0.0, 0.0),
+            "specular": s.base_color,
+            "roughness": float((wide * narrow) ** 0.25),
+            "anisotropy": min((1 - ratio) / 0.9, 1.0),
+            "direction": (s.anisotropy_rotation + 90) % 360 - 180,  # the grain lies across the wide way
+        }
+        known = {"base_color": "specular"}
+        told = ("metallic", "anisotropy", "specular", "specular_color", "edge_tint")
+        return self._made("ward", values, known, *told)
+
+    def _made(self, model: str, values: dict[str, Value], known: dict[str, str], *told: str) -> Material:
+        """`known`: our parameter for a picture of a field; `told`: fields whose loss was said or is none."""
+        s = self.surface
+        for name, word in (
+            ("sheen_color", "sheen is"),
+            ("clearcoat", "clear coat is"),
+            ("anisotropy", "grain is"),
+            ("diffuse_roughness", "matte part's roughness is"),
+            ("edge_tint", "rim's tint is"),
+        ):
+            if name not in told and getattr(s, name) != getattr(Surface, name):
+                self._tell(f"its {word} left out")
+        textures: dict[str, Texture] = {}
+        for name, texture in s.textures.items():
+            if name == NORMAL:
+                textures[name] = texture
+            elif name in known:
+                self._lay(known[name], name, texture, values, textures, model)
+            elif name == "roughness" and model in ("plastic", "ward", "ggx-conductor", "ggx-dielectric"):
+                values["roughness"] = times(values["roughness"], texture)
+                self._mean(name)
+            elif name not in told:
+                self._mean(name)
+        return Material(
+            id=new_id("material"),
+            name=s.name,
+            model=model,
+            values=frozen_map(values),
+            textures=frozen_map(textures),
+            opacity=s.opacity,
+        )
+
+    def _lay(
+        self,
+        parameter: str,
+        name: str,
+        texture: Texture,
+        values: dict[str, Value],
+        textures: dict[str, Texture],
+        model: str,
+    ) -> None:
+        """The picture as it is, or its mean where the model's pictures must lie alike."""
+        first = next((t for n, t in textures.items() if n not in ("roughness", NORMAL)), None)
+        if name != "roughness" and first is not None:
+            large = max(_texels(first), _texels(texture)) > MOST_TEXELS
+            if large or not alike(first, texture):
+                why = "is too large" if large else "lies otherwise than its colour"
+                self.say(
+                    f"The picture of the {_WORDS[name]} of {self.surface.name!r} {why}: its mean is used."
+                )
+                values[parameter] = times(values[parameter], texture)
+                return
+        textures[parameter] = texture
+
+    def _mean(self, name: str) -> None:
+        self.say(f"The mean of the picture of the {_WORDS.get(name, name)} of {self.surface.name!r} is used.")
+
+    def _tell(self, what: str) -> None:
+        self.say(f"{self.surface.name}: {what}.")
+
+
+def _texels(texture: Texture) -> int:
+    return int(texture.image.pixels[..., 0].size)
