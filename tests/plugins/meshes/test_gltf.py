@@ -442,3 +442,67 @@ def test_a_file_of_trimesh_comes_back(tmp_path: Path) -> None:
     geometry = IMPORTER.load(tmp_path / "box.glb").objects[0].geometry
     np.testing.assert_allclose(geometry.bounds, box.bounds, atol=1e-6)
     assert len(geometry.faces) == 12
+
+
+EXTENSIONS = {
+    "KHR_materials_clearcoat": {"clearcoatFactor": 0.8, "clearcoatRoughnessFactor": 0.1},
+    "KHR_materials_ior": {"ior": 1.33},
+    "KHR_materials_specular": {"specularFactor": 0.5},
+    "KHR_materials_anisotropy": {"anisotropyStrength": 0.6, "anisotropyRotation": math.pi / 2},
+}
+DIELECTRIC = {"metallicFactor": 0.0, "baseColorFactor": [0.5, 0.2, 0.1, 1.0]}
+
+
+@pytest.mark.parametrize(
+    ("extensions", "model", "values"),
+    [
+        (("KHR_materials_clearcoat",), "plastic", {"gloss": 0.8, "roughness": 0.1, "depth": 0.0}),
+        (("KHR_materials_ior",), "ggx", {"specular": (0.33 / 2.33) ** 2 / 0.08}),
+        (("KHR_materials_specular", "KHR_materials_ior"), "plastic", {"gloss": 0.5, "ior": 1.33}),
+    ],
+)
+def test_layers_of_extensions(
+    tmp_path: Path, extensions: tuple[str, ...], model: str, values: dict[str, float]
+) -> None:
+    chosen = {name: EXTENSIONS[name] for name in extensions}
+    made, _ = with_material(tmp_path, pbrMetallicRoughness=DIELECTRIC, extensions=chosen)
+    assert made.model == model
+    for name, value in values.items():
+        assert made.values[name] == pytest.approx(value)
+
+
+def test_brushed_metal_has_its_grain_across_the_wide_direction(tmp_path: Path) -> None:
+    chosen = {"KHR_materials_anisotropy": EXTENSIONS["KHR_materials_anisotropy"]}
+    made, _ = with_material(tmp_path, pbrMetallicRoughness={"roughnessFactor": 0.3}, extensions=chosen)
+    assert made.model == "ward"
+    assert made.values["direction"] == pytest.approx(0.0, abs=1e-9)
+
+
+def test_what_has_no_place_here_is_said(tmp_path: Path) -> None:
+    others = {"KHR_materials_iridescence": {}, "KHR_materials_unlit": {}}
+    _, model = with_material(tmp_path, extensions=others)
+    told = " ".join(model.notes)
+    assert "KHR_materials_iridescence" in told
+    assert "without light" in told
+
+
+@pytest.mark.parametrize("channels", [3, 4])
+def test_pictures_of_extensions_use_their_own_channel(tmp_path: Path, channels: int) -> None:
+    """The specular weight is in alpha: without one it is 1."""
+    pixels = np.full((2, 2, channels), 64, np.uint8)
+    made = square(material=0)
+    told = {"specularFactor": 0.5, "specularTexture": {"index": 0}}
+    made.json |= {
+        "images": [{"bufferView": made.view(encode_png(pixels))}],
+        "textures": [{"source": 0}],
+        "materials": [{"pbrMetallicRoughness": DIELECTRIC, "extensions": {"KHR_materials_specular": told}}],
+    }
+    found = load(tmp_path, made).materials[0]
+    assert found.values["gloss"] == pytest.approx(0.5 * (64 / 255 if channels == 4 else 1))
+
+
+def test_a_file_of_materials_alone(tmp_path: Path) -> None:
+    whole = {"asset": {"version": "2.0"}, "materials": [{"name": "oak"}, {"name": "brass"}]}
+    model = load(tmp_path, json.dumps(whole).encode(), name="model.gltf")
+    assert model.nodes == ()
+    assert [material.name for material in model.materials] == ["oak", "brass"]
