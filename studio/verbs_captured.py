@@ -7,6 +7,7 @@ import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from studio import captured_sources
 from studio_core.errors import InputError
 
 if TYPE_CHECKING:
@@ -17,12 +18,11 @@ if TYPE_CHECKING:
 
 def add_options(verb: argparse.ArgumentParser) -> None:
     """The options of `fit-material`."""
-    verb.add_argument("source", type=Path, metavar="FOLDER", help="photographs of a ball, one light each")
-    verb.add_argument("--lights", type=Path, metavar="FILE.lp|TABLE", help="where lamps were")
+    verb.add_argument("source", type=Path, metavar="FOLDER", help="photographs, one lamp each")
+    captured_sources.add_options(verb)
     verb.add_argument("--holdout", metavar="FRACTION|NAME,…", help="lights kept back, to be asked about")
     verb.add_argument("--basis", default="", metavar="NAME", help="of each spot's own part")
     verb.add_argument("--no-refine", action="store_true", help="take lights as given")
-    verb.add_argument("--distance", type=float, metavar="R", help="of the camera, in radii of the ball")
     verb.add_argument("--size", type=int, default=256, metavar="N", help="texels a side (default: 256)")
     verb.add_argument("-o", "--out", type=Path, metavar="OUT.exr", help="the maps, a layer a column")
     verb.add_argument("--report", type=Path, metavar="OUT.json", help="how it was fitted and how well")
@@ -34,33 +34,23 @@ def fit_material(options: argparse.Namespace, program: Headless) -> None:
 
     from studio.verbs import check_target, result
     from studio_core.imaging.encode import write_exr
-    from studio_plugins.residual.ball import find_ball
     from studio_plugins.residual.fit import fit
-    from studio_plugins.residual.lights import read_lights
-    from studio_plugins.residual.pictures import read_folder
-    from studio_plugins.residual.reflectance_map import reflectance_maps
     from studio_plugins.residual.result import Settings
 
     if not 8 <= options.size <= 2048:
         raise InputError(f"--size {options.size}: maps have 8 to 2048 texels a side")
-    if options.distance is not None and not options.distance > 1.01:
-        raise InputError(f"--distance {options.distance:g}: the camera is outside of the ball")
     for path, suffix, what in ((options.out, ".exr", "maps"), (options.report, ".json", "reports")):
         if path is not None:
             check_target(path, (suffix,), what)
-    listed = read_lights(options.lights) if options.lights is not None else None
-    with program.job("Reading") as job:
-        pictures = read_folder(options.source, listed, job)
-    found = find_ball(pictures.light, options.distance or float("inf"))
-    samples = reflectance_maps(pictures.light, pictures.clipped, found.ball, pictures.lights, options.size)
+    source = captured_sources.read_source(options, program)
+    samples = source.samples
     held = _held(options.holdout, samples.lights)
     settings = Settings(basis=options.basis, refine=0 if options.no_refine else Settings().refine)
     with program.job("Fitting") as job:
         made = fit(samples.some(~held), settings, job)
-    for note in (*pictures.notes, *made.notes):
+    for note in (*source.notes, *made.notes):
         program.say(note)
-    ball = {"x": found.ball.x, "y": found.ball.y, "radius": found.ball.radius, "spread": found.spread}
-    values: dict[str, Any] = {"source": str(options.source), "ball": ball, "fit": made.report()}
+    values: dict[str, Any] = {"source": str(options.source), **source.found, "fit": made.report()}
     if held.any():
         values["holdout"] = _errors(made, samples.some(held), bool(settings.refine))
     if options.report is not None:

@@ -22,9 +22,9 @@ from studio_core.capturing.settings import (
     Shot,
 )
 from studio_core.errors import InputError
+from studio_core.imaging.listed_exposures import Exposed, completed, joined, listed_exposures
 from studio_core.imaging.photograph import Photograph
 from studio_core.shading.job import Job
-from studio_plugins.capture.bracket_exposures import Exposed, completed, joined, listed_exposures
 from studio_plugins.capture.bracket_looks import Look, dark_ends, goes_round, look_at, two_discs, well_exposed
 from studio_plugins.capture.bracket_sides import Member, in_order, part
 from studio_plugins.capture.bracket_turns import turned_back

@@ -4,9 +4,10 @@ After residual-srf.txt (Ma et al., "An Efficient Representation of Complex Mater
 Rendering"): f = f_r + δ*, with δ* = s(P) · H at each texel. Everything here works on arrays, without a
 window.
 
-- what is known: `samples` (lights, ball, samples), `lights` (angles, names, `.lp` files, mirror ball)
-- from pictures: `pictures` (a folder's files), `ball` (where the sphere is, to a fraction of a pixel),
-  `reflectance_map`
+- what is known: `samples` (lights, ball, samples), `lights` (tables, `.lp` files, mirror ball), `names`
+  (what a set of file names tells), `folder` (what belongs together)
+- from pictures: `brackets` (exposures become light), `pictures` (a folder's light), `ball` (where the sphere
+  is, to a fraction of a pixel), `reflectance_map`, `flat`
 - the fit: `parametric` (f_r), `bases` (δ*), `tables` (what all texels share), `masks`, `solve` (rank-aware,
   robust), `refine` (light directions and strengths), `fit` puts them in order and chooses
 - what came of it: `result`, `errors`, `splits`, `frames` (tangent space)

@@ -14,10 +14,11 @@ import numpy as np
 
 from studio_core.colour import LUMINANCE
 from studio_core.errors import InputError
-from studio_plugins.residual.samples import F32, F64, Ball
+from studio_plugins.residual.samples import F32, F64, Ball, Flags
 
 _RAYS = 720
 _STEP = 0.25  # pixels
+_NOT_DARK = 0.03  # of the brightest
 _LUMINANCE = np.array(LUMINANCE, np.float32)
 
 
@@ -32,11 +33,27 @@ class Found:
     spread: float
 
 
-def find_ball(pictures: F32, distance: float = float("inf")) -> Found:
+def find_ball(pictures: F32, distance: float = float("inf"), mask: Flags | None = None) -> Found:
     """The sphere in pictures (n, H, W, 3) of one camera; `distance` as in `Ball`. InputError where none
     is seen.
+
+    Before a background that is not dark, it is what changes from lamp to lamp that is looked at. A mask
+    (H, W) of the ball is believed.
     """
-    light = _brightest(pictures)
+    if mask is not None:
+        return _found(mask.astype(np.float32), distance)
+    ways = [_brightest, _changing] if len(pictures) > 1 else [_brightest]
+    if _behind(_brightest(pictures)) > _NOT_DARK:
+        ways = ways[::-1]
+    for way in ways[:-1]:
+        try:
+            return _found(way(pictures), distance)
+        except InputError:
+            continue
+    return _found(ways[-1](pictures), distance)
+
+
+def _found(light: F32, distance: float) -> Found:
     x, y, radius = _guess(light)
     seen, spread = 0.0, np.inf
     for window in (0.12, 0.06, 0.03, 0.03):
@@ -63,12 +80,25 @@ def _brightest(pictures: F32) -> F32:
     return np.asarray(np.minimum(made, np.float32(2)), np.float32)
 
 
+def _changing(pictures: F32) -> F32:
+    """What the lamps add to the darkest that each pixel is seen, by their own brightness."""
+    light = np.einsum("nhwc,c->nhw", pictures, _LUMINANCE)
+    light -= light.min(axis=0)
+    scale = np.percentile(light.reshape(len(light), -1), 98, axis=1)
+    made = np.max(light / np.maximum(scale, 1e-9)[:, None, None].astype(np.float32), axis=0)
+    return np.asarray(np.minimum(made, np.float32(2)), np.float32)
+
+
+def _behind(light: F32) -> float:
+    """How bright the picture's border is."""
+    return float(np.median(np.concatenate([light[0], light[-1], light[:, 0], light[:, -1]])))
+
+
 def _guess(light: F32) -> tuple[float, float, float]:
     """Centre and radius of the largest bright region."""
     from scipy import ndimage
 
-    border = np.concatenate([light[0], light[-1], light[:, 0], light[:, -1]])
-    back, top = float(np.median(border)), float(np.percentile(light, 95))
+    back, top = _behind(light), float(np.percentile(light, 95))
     if top < back + 1e-4:
         raise InputError(
             "no ball was found in the pictures: they show nothing that is brighter than their border"

@@ -1,144 +1,209 @@
-"""A folder of photographs of one sample under one light each, brackets of a light merged.
+"""A folder of photographs of one sample under one lamp each, as light: developed, balanced, made smaller.
 
-Floating-point and raw files are linear; whole numbers are taken for sRGB. Pictures of one light are told
-apart by their exposure (Exif, or a time such as `t0.5` in the name) and merged: each pixel by the exposures
-that do not clip there, weighted by their length, for the noise of reading is the same in all.
+Floating-point and raw files are linear; whole numbers are taken for sRGB, unless brackets tell the camera's
+curve (`brackets`). Pictures of one lamp that differ in exposure are merged. What a picture without any lamp
+shows is taken off. Large pictures are averaged down, so that all lamps fit into memory together.
 """
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from pathlib import Path, PurePath
+from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 
+from studio_core.colour import LUMINANCE
 from studio_core.errors import InputError
 from studio_core.imaging.io import ImageDecoder
-from studio_core.imaging.photograph import Photograph, in_rec709
-from studio_core.imaging.photograph_read import PHOTOGRAPHS, read_photograph
-from studio_core.imaging.transfer import srgb_to_linear
+from studio_core.imaging.photograph import Photograph
+from studio_core.imaging.photograph_read import read_photograph
 from studio_core.shading.job import Job
-from studio_plugins.residual.lights import angles_of, lights_for
+from studio_plugins.residual.brackets import AUTOMATIC, Developer, Light, with_told
+from studio_plugins.residual.folder import Group, look_through
+from studio_plugins.residual.lights import LightList
 from studio_plugins.residual.samples import F32, F64, Flags, Lights
 
-_TIME = re.compile(
-    r"(?:^|[_\W])(?:t|time|exp)[_=]?(\d+(?:\.\d+)?)(?:[_-](\d+))?(?=s?(?:[_\W]|$))", re.IGNORECASE
-)
-_CLIPPED = 0.99
-_MOST = 2_000_000_000  # bytes of all pictures together
+_MOST = 900_000_000  # bytes of all lamps together
+_UNREADABLE = 1 / 3  # of all pictures: more, and it is no longer this folder's fault
 
 
 @dataclass(frozen=True, eq=False)
 class Pictures:
-    """Linear light (n, H, W, 3), where all exposures clip (n, H, W), the lights, and what was noticed."""
+    """Linear light (n, H, W, 3), where all exposures clip (n, H, W), the lights, and what was noticed.
+
+    `mask` (H, W): where the sample is, if a picture says so; `factor`: pixels of the files along one here;
+    `size`: height and width of the files.
+    """
 
     light: F32
     clipped: Flags
     lights: Lights
     notes: tuple[str, ...] = ()
+    mask: Flags | None = None
+    factor: int = 1
+    size: tuple[int, int] = (0, 0)
+
+    def with_lights(self, lights: Lights) -> Pictures:
+        """The same under lamps whose places became known."""
+        return replace(self, lights=lights)
+
+    def balanced(self, white: Sequence[float]) -> Pictures:
+        """As if what shows the colour `white` were neutral; of the same luminance. InputError for no colour.
+
+        Only ratios count: (0.9, 1, 1.2), the numbers of a grey card's picture, or a camera's multipliers
+        inverted.
+        """
+        colour = np.asarray(white, np.float64)
+        if colour.shape != (3,) or not (np.isfinite(colour).all() and (colour > 0).all()):
+            raise InputError("a white has three numbers above zero")
+        gains = float(colour @ np.asarray(LUMINANCE)) / colour
+        return replace(self, light=self.light * gains.astype(np.float32))
+
+    def spot(self, x: float, y: float, radius: float) -> F64:
+        """(3,) mean colour of a round place, in pixels of the files, over all lamps where it is not clipped.
+
+        InputError when nothing is there.
+        """
+        height, width = self.light.shape[1:3]
+        at_x, at_y = np.meshgrid(np.arange(width) + 0.5, np.arange(height) + 0.5)
+        near = np.hypot(at_x - x / self.factor, at_y - y / self.factor) <= max(radius / self.factor, 0.75)
+        use = near[None] & ~self.clipped
+        colours = self.light[use].astype(np.float64)
+        mean = colours.mean(axis=0) if len(colours) else np.zeros(3)
+        if not (mean > 1e-6).all():
+            raise InputError(f"the white at {x:g}, {y:g} cannot be used: the pictures show no light there")
+        return np.asarray(mean, np.float64)
 
 
 def read_folder(
-    folder: str | Path, listed: Mapping[str, F64] | None = None, job: Job | None = None
+    folder: str | Path,
+    listed: LightList | Mapping[str, F64] | None = None,
+    job: Job | None = None,
+    *,
+    response: str = AUTOMATIC,
+    directions: bool = True,
+    most: int = _MOST,
 ) -> Pictures:
-    """All photographs of a folder, lights by `listed` (see `lights.read_lights`) or else by file names.
+    """All photographs of a folder by lamp; see `folder.look_through` for where lamps are told.
 
-    With a list, pictures that it does not hold are left out, and said. InputError in one sentence.
+    `response`: one of `brackets.RESPONSES`; `directions`: False where they come from elsewhere (they are then
+    towards the camera); `most`: bytes that all lamps may take. Pictures that cannot be read, or have another
+    size, are left out and said, as long as they are few. InputError in one sentence.
     """
-    folder = Path(folder)
-    if not folder.is_dir():
-        raise InputError(f"{folder} cannot be read: there is no such folder")
-    paths = sorted(path for path in folder.iterdir() if path.suffix.lower() in PHOTOGRAPHS and path.is_file())
-    notes = []
-    if listed is not None:
-        stems = {PurePath(name).stem.lower() for name in listed}
-        known = [path for path in paths if path.stem.lower() in stems]
-        if len(known) < len(paths):
-            notes.append(
-                f"{len(paths) - len(known)} pictures are left out: the list of lights does not hold them"
-            )
-        paths = known
-    if not paths:
-        raise InputError(f"{folder} cannot be used: it holds no photographs with a light")
-    lights = lights_for([path.name for path in paths], listed)
-    groups = _by_light(paths, lights, listed is None)
-    light: list[F32] = []
-    clipped: list[Flags] = []
+    found = look_through(folder, listed, directions)
+    made: list[tuple[Group, Light, tuple[int, int]]] = []
     with ImageDecoder() as decoder:
-        for done, group in enumerate(groups):
+        reader = _Reader(decoder, sum(len(group.paths) for group in found.groups))
+        developer = Developer(found.groups, reader.shots, response)
+        dark = developer.light(found.dark) if found.dark is not None else None
+        for done, group in enumerate(found.groups):
             if job is not None:
-                job.checkpoint(done, len(groups))
-            shots = [read_photograph(paths[i], decoder=decoder) for i in group]
-            picture, full = merged(shots)
-            if light and picture.shape != light[0].shape:
-                size, before = (f"{p.shape[1]} × {p.shape[0]}" for p in (picture, light[0]))
-                name = paths[group[0]].name
-                raise InputError(f"{name} cannot be used: it is {size} pixels, those before it {before}")
-            if picture.nbytes * len(groups) > _MOST:
-                raise InputError(f"{folder} cannot be used: its pictures are too large to be held together")
-            light.append(picture)
-            clipped.append(full)
-    return Pictures(np.stack(light), np.stack(clipped), lights.some([g[0] for g in groups]), tuple(notes))
+                job.checkpoint(done, len(found.groups))
+            light = developer.light(group)
+            if light is not None:
+                size = light.pixels.shape[:2]
+                if dark is not None and dark.pixels.shape == light.pixels.shape:
+                    light = Light(np.maximum(light.pixels - dark.pixels, np.float32(0)), light.clipped)
+                made.append((group, _smaller(light, _factor(size, len(found.groups), most)), size))
+        if not made:
+            raise InputError(reader.last or f"{folder} cannot be used: it holds no photographs with a light")
+        sizes = [size for _, _, size in made]
+        usual = max(dict.fromkeys(sizes), key=sizes.count)
+        for group, _, size in made:
+            if size != usual:
+                reader.leave_out(
+                    f"{group.name} is left out: it is {size[1]} × {size[0]} pixels,"
+                    f" the others are {usual[1]} × {usual[0]}",
+                    len(group.paths),
+                )
+        made = [one for one in made if one[2] == usual]
+        factor = _factor(usual, len(found.groups), most)
+        mask = None
+        if found.mask is not None:
+            mask = reader.mask(found.mask, usual, factor)
+    towards = [np.array([0.0, 0.0, 1.0]) if g.direction is None else g.direction for g, _, _ in made]
+    lights = Lights.of(np.stack(towards), found.source, tuple(group.name for group, _, _ in made))
+    return Pictures(
+        np.stack([light.pixels for _, light, _ in made]),
+        np.stack([light.clipped for _, light, _ in made]),
+        lights,
+        (*found.notes, *developer.notes, *reader.notes),
+        mask,
+        factor,
+        usual,
+    )
 
 
-def _by_light(paths: Sequence[Path], lights: Lights, by_name: bool) -> list[list[int]]:
-    groups: dict[object, list[int]] = {}
-    for i, path in enumerate(paths):
-        key = angles_of(path.name) if by_name else tuple(np.round(lights.directions[i], 6))
-        groups.setdefault(key, []).append(i)
-    return list(groups.values())
+def read_mask(path: str | Path, size: tuple[int, int], factor: int = 1) -> Flags:
+    """(H, W) of a picture of `size` (height, width) that is bright where the sample is, made smaller.
 
-
-def merged(shots: Sequence[Photograph]) -> tuple[F32, Flags]:
-    """Linear light (H, W, 3) per second (or of the only shot as it is), and what every exposure clips (H, W).
-
-    InputError naming the picture whose exposure is not told, or which differs in size.
+    InputError when it cannot be read or has another size.
     """
-    times = [1.0] if len(shots) == 1 else [_exposure(shot) for shot in shots]
-    first = shots[0].pixels.shape
-    total, weights = np.zeros(first, np.float64), np.zeros(first[:2], np.float64)
-    shortest = int(np.argmin(times))
-    clipped = np.zeros(first[:2], np.bool_)
-    for i, (shot, time) in enumerate(zip(shots, times, strict=True)):
-        if shot.pixels.shape != first:
+    with ImageDecoder() as decoder:
+        return _Reader(decoder, 1).mask(Path(path), size, factor)
+
+
+class _Reader:
+    """Reads photographs, and keeps account of what cannot be used."""
+
+    def __init__(self, decoder: ImageDecoder, total: int) -> None:
+        self.notes: list[str] = []
+        self.last = ""
+        self._decoder, self._total = decoder, total
+        self._bad: dict[object, int] = {}
+
+    def shots(self, group: Group) -> list[Photograph]:
+        """Those of a group that can be read."""
+        made = []
+        for path, told in zip(group.paths, group.told, strict=True):
+            try:
+                made.append(with_told(read_photograph(path, decoder=self._decoder), told))
+            except InputError as error:
+                self.leave_out(f"{str(error).rstrip('.')}: it is left out")
+        return made
+
+    def leave_out(self, why: str, count: int = 1) -> None:
+        """Say it; InputError when it is too many."""
+        if why not in self._bad:
+            self._bad[why] = count
+            self.notes.append(why)
+            self.last = self.last or why.removesuffix(": it is left out")
+        if sum(self._bad.values()) > _UNREADABLE * self._total:
+            raise InputError(self.last)
+
+    def mask(self, path: Path, size: tuple[int, int], factor: int) -> Flags:
+        """The sample's place."""
+        pixels = read_photograph(path, decoder=self._decoder).pixels
+        if pixels.shape[:2] != size:
             raise InputError(
-                f"{shot.facts.name} cannot be merged: it has another size than {shots[0].facts.name}"
+                f"{path.name} cannot be used: the mask is {pixels.shape[1]} × {pixels.shape[0]} pixels,"
+                f" the pictures are {size[1]} × {size[0]}"
             )
-        light, full = _linear(shot)
-        if i == shortest:
-            clipped = full
-        weight = np.where(full, 1e-9 if i == shortest else 0.0, time)
-        total += weight[..., None] * (light.astype(np.float64) / time)
-        weights += weight
-    return np.asarray(total / weights[..., None], np.float32), clipped
+        grey = pixels.astype(np.float32).mean(axis=-1)
+        made = (grey > 0.5 * float(grey.max(initial=0.0))).astype(np.float32)
+        if not 0 < made.mean() < 1:
+            raise InputError(
+                f"{path.name} cannot be used: a mask is bright where the sample is, dark elsewhere"
+            )
+        return np.asarray(_averaged(made, factor) > 0.5)
 
 
-def _linear(shot: Photograph) -> tuple[F32, Flags]:
-    pixels = shot.pixels
-    if pixels.dtype == np.float32:
-        # a value that many pixels share exactly at the top is where the sensor ended
-        full: Flags = np.asarray((pixels >= max(float(pixels.max(initial=0.0)), 1e-9)).any(axis=-1), np.bool_)
-        return in_rec709(pixels, shot.colour), full & (np.count_nonzero(full) > 8)
-    top = float(np.iinfo(pixels.dtype).max)
-    full = np.asarray((pixels >= _CLIPPED * top).any(axis=-1), np.bool_)
-    encoded = pixels if pixels.dtype == np.uint8 else pixels.astype(np.float32) / np.float32(top)
-    return in_rec709(srgb_to_linear(encoded), shot.colour), full
+def _factor(size: tuple[int, int], count: int, most: int) -> int:
+    return max(int(np.ceil(np.sqrt(size[0] * size[1] * 12.0 * count / most))), 1)
 
 
-def _exposure(shot: Photograph) -> float:
-    """Light let in, any unit that all shots share."""
-    found = _TIME.search(PurePath(shot.facts.name).stem)
-    if found:
-        time = float(found[1]) / float(found[2] or 1)
-    elif shot.facts.ev is not None:
-        time = 2.0**shot.facts.ev
-    else:
-        time = 0.0
-    if not time > 0:
-        raise InputError(
-            f"{shot.facts.name} cannot be merged with others of its light: neither Exif nor a name such as"
-            " az-30_t0.5 tells its exposure"
-        )
-    return time
+def _smaller(light: Light, factor: int) -> Light:
+    if factor == 1:
+        return light
+    return Light(_averaged(light.pixels, factor), _averaged(light.clipped.astype(np.float32), factor) > 0)
+
+
+def _averaged(picture: F32, factor: int) -> F32:
+    import cv2
+
+    if factor == 1:
+        return picture
+    height, width = (n // factor for n in picture.shape[:2])
+    some = picture[: height * factor, : width * factor]
+    return np.asarray(cv2.resize(some, (width, height), interpolation=cv2.INTER_AREA), np.float32)

@@ -76,3 +76,21 @@ def test_a_map_shows_each_slope_where_it_is() -> None:
     assert np.abs(samples.values[0] - slopes(64)).max() < 2e-3
     assert 1 <= np.count_nonzero(~samples.usable) <= 9
     assert not samples.usable[0, 31:33, 31:33].all()
+
+
+@pytest.mark.parametrize("backdrop", [0.12, 0.5])
+def test_a_ball_before_something_that_is_not_dark(backdrop: float) -> None:
+    rig = Rig(size=(150, 140), ball=Ball(76.3, 68.6, 55.0), backdrop=backdrop)
+    shots = shoot(library()["textured"], row(), rig)
+    uneven = np.linspace(1.2, 0.8, 150, dtype=np.float32)[None, None, :, None]
+    behind = shots.pictures == np.float32(backdrop)
+    pictures = np.where(behind, shots.pictures * uneven, shots.pictures)
+    found = find_ball(pictures).ball
+    assert max(abs(found.x - 76.3), abs(found.y - 68.6), abs(found.radius - 55)) < 0.4
+
+
+def test_a_mask_says_where_the_ball_is() -> None:
+    y, x = np.mgrid[:90, :100] + 0.5
+    disc = np.hypot(x - 51.2, y - 44.1) < 33.3
+    found = find_ball(np.random.default_rng(1).random((2, 90, 100, 3)).astype(np.float32), mask=disc).ball
+    assert max(abs(found.x - 51.2), abs(found.y - 44.1), abs(found.radius - 33.3)) < 0.1

@@ -11,13 +11,13 @@ from hypothesis import strategies as st
 
 from studio_core.errors import InputError
 from studio_plugins.residual.lights import (
-    angles_of,
     from_mirror_ball,
     lights_for,
     read_lights,
     write_lp,
     write_table,
 )
+from studio_plugins.residual.names import told_by
 from studio_plugins.residual.samples import Ball, Lights
 
 
@@ -36,7 +36,8 @@ from studio_plugins.residual.samples import Ball, Lights
     ],
 )
 def test_file_names_tell_angles(name: str, told: tuple[float, float] | None) -> None:
-    assert angles_of(name) == told
+    (one,) = told_by([name])
+    assert (None if one.azimuth is None else (one.azimuth, one.height)) == told
 
 
 @given(st.lists(st.tuples(st.floats(-170, 170), st.floats(-80, 80)), min_size=1, max_size=8))

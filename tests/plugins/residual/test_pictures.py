@@ -57,12 +57,10 @@ def test_what_a_folder_lacks_is_said(tmp_path: Path, shots: LabShots) -> None:
         read_folder(tmp_path)
     write_shots(shots, tmp_path)
     write_exr(tmp_path / "az60.exr", np.ones((20, 20, 3), np.float32))
-    with pytest.raises(InputError, match=r"az60\.exr .* 20 × 20"):
-        read_folder(tmp_path)
+    assert any("az60.exr" in note and "20 × 20" in note for note in read_folder(tmp_path).notes)
     write_exr(tmp_path / "az60.exr", np.ones((36, 40, 3), np.float32))
     write_exr(tmp_path / "az60_b.exr", np.ones((36, 40, 3), np.float32))
-    with pytest.raises(InputError, match="exposure"):
-        read_folder(tmp_path)
+    assert any("do not tell their exposures" in note for note in read_folder(tmp_path).notes)
 
 
 def test_a_list_chooses_its_pictures(tmp_path: Path, shots: LabShots) -> None:

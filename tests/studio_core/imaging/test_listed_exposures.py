@@ -7,8 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from studio_core.capturing.settings import BACK, FRONT
+from studio_core.imaging.listed_exposures import Exposed, Listed, completed, listed_exposures
 from studio_core.imaging.photograph import ShotFacts
-from studio_plugins.capture.bracket_exposures import Exposed, Listed, completed, listed_exposures
 
 STOPS = st.floats(-8, 8).map(lambda v: round(v, 3))
 
