@@ -112,4 +112,4 @@ def test_lamps_on_a_mirror_ball_and_a_ball_told(tmp_path: Path) -> None:
     told = json.loads(report.read_text())["fit"]
     assert told["light_source"] == "mirror ball"
     found = np.array([one["direction"] for one in told["lights"]])
-    assert np.degrees(np.arccos((found * shots.told.directions).sum(axis=1))).max() < 3.5  # of a ball 30 pixels wide
+    assert np.degrees(np.arccos((found * shots.told.directions).sum(axis=1))).max() < 3.5  # a small ball
