@@ -27,6 +27,11 @@ def _rough(name: str, tags: str, colour: str, roughness: float) -> Kept:
     return _kept(name, tags, "oren-nayar", base_color=_srgb(colour), roughness=roughness)
 
 
+def _cloth(name: str, tags: str, colour: str, sheen: str, roughness: float) -> Kept:
+    values: dict[str, Value] = {"base_color": _srgb(colour), "sheen": _srgb(sheen), "roughness": roughness}
+    return _kept(name, f"fabric {tags}", "cloth", **values)
+
+
 def _coated(name: str, tags: str, colour: str, roughness: float, gloss: float = 1.0) -> Kept:
     return _kept(name, tags, "plastic", base_color=_srgb(colour), roughness=roughness, gloss=gloss)
 
@@ -68,14 +73,25 @@ PRESETS: tuple[Kept, ...] = (
         "Aluminium, brushed", "metal brushed", "ward",
         diffuse=(0.0, 0.0, 0.0), specular=_METAL["Aluminium"], roughness=0.5, anisotropy=0.8,
     ),
+    _kept(
+        "Anthracite lacquer, brushed", "paint brushed furniture", "ashikhmin-shirley",
+        diffuse=_srgb("#35373a"), specular=(0.06, 0.06, 0.06), sharpness_along=4000.0, sharpness_across=60.0,
+    ),
     _coated("Plastic, white", "plastic", "#ebebe8", 0.25),
     _coated("Plastic, black", "plastic", "#1a1a1b", 0.35),
     _coated("Plastic, orange", "plastic gloss", "#d05a1c", 0.12),
     _rough("Rubber, black", "plastic matt", "#202021", 0.8),
-    _rough("Linen, natural", "fabric curtain", "#c9bda6", 0.8),
+    _cloth("Linen, natural", "curtain", "#c4b79e", "#6b6455", 0.8),
     _rough("Cotton, white", "fabric curtain", "#ecebe6", 0.7),
-    _rough("Felt, grey", "fabric", "#77777a", 1.0),
-    _rough("Wool, petrol", "fabric upholstery", "#2e5560", 1.0),
+    _cloth("Felt, grey", "", "#6c6c6f", "#8a8a8c", 1.0),
+    _cloth("Wool, petrol", "upholstery", "#264a55", "#6d8f97", 0.9),
+    _cloth("Velvet, bottle green", "upholstery curtain", "#0f2a1e", "#7fae95", 0.35),
+    _cloth("Velvet, burgundy", "upholstery curtain", "#3a0d14", "#c4808a", 0.35),
+    _cloth("Suede, sand", "leather upholstery", "#a2845f", "#b39b7c", 0.6),
+    _kept(
+        "Satin, champagne", "fabric satin curtain", "ashikhmin-shirley",
+        diffuse=_srgb("#b8a27e"), specular=_srgb("#6e6350"), sharpness_along=120.0, sharpness_across=6.0,
+    ),
     _coated("Leather, cognac", "leather upholstery", "#8a4f2a", 0.5, 0.8),
     _coated("Leather, black", "leather upholstery", "#1c1b1a", 0.42, 0.9),
     _coated("Marble, white, polished", "stone floor gloss", "#e6e3de", 0.1),

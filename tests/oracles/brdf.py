@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 from oracles.facets import ggx_conductor, ggx_dielectric, plastic
+from oracles.fibres import cloth
 
 Array = npt.NDArray[np.float64]
 Values = Mapping[str, Any]
@@ -105,6 +106,25 @@ def ward(values: Values, wo: Array, wi: Array) -> Array:
     return above[..., None] * (diffuse / np.pi + specular * lobe[..., None])
 
 
+def ashikhmin_shirley(values: Values, wo: Array, wi: Array) -> Array:
+    """(..., 3) f_r of `ashikhmin-shirley`, with the angle of h from the grain as printed."""
+    wo, wi = unit(wo), unit(wi)
+    above = _above(wo, wi)
+    wo, wi = (np.where(above[..., None], w, [0.0, 0.0, 1.0]) for w in (wo, wi))
+    n, m = float(values["sharpness_along"]), float(values["sharpness_across"])
+    rho, f0 = _colour(values["diffuse"]), _colour(values["specular"])
+    h = unit(wo + wi)
+    phi = np.arctan2(h[..., 1], h[..., 0]) - np.radians(float(values["direction"]))
+    power = n * np.cos(phi) ** 2 + m * np.sin(phi) ** 2
+    raised = np.exp(power / 2 * np.log1p(-np.minimum(h[..., 0] ** 2 + h[..., 1] ** 2, 1 - 1e-15)))
+    hk, no, ni = (wo * h).sum(-1), wo[..., 2], wi[..., 2]
+    lobe = np.sqrt((n + 1) * (m + 1)) / (8 * np.pi) * raised / (hk * np.maximum(no, ni))
+    specular = lobe[..., None] * (f0 + (1 - f0) * ((1 - hk) ** 5)[..., None])
+    matte = 28 / (23 * np.pi) * rho * (1 - f0)
+    matte = matte * ((1 - (1 - no / 2) ** 5) * (1 - (1 - ni / 2) ** 5))[..., None]
+    return above[..., None] * (matte + specular)
+
+
 def oren_nayar(values: Values, wo: Array, wi: Array) -> Array:
     """(..., 3) f_r of `oren-nayar`: EON, its directional albedo with the tangent as printed."""
     wo, wi = unit(wo), unit(wi)
@@ -139,6 +159,8 @@ ORACLES: dict[str, Callable[[Values, Array, Array], Array]] = {
     "ggx-dielectric": ggx_dielectric,
     "plastic": plastic,
     "ward": ward,
+    "ashikhmin-shirley": ashikhmin_shirley,
+    "cloth": cloth,
 }
 
 

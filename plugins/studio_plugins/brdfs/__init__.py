@@ -18,6 +18,8 @@ plugin = Plugin(
             "ggx-dielectric": f"{_HERE}.ggx_dielectric:MODEL",
             "plastic": f"{_HERE}.plastic:MODEL",
             "ward": f"{_HERE}.ward:MODEL",
+            "ashikhmin-shirley": f"{_HERE}.ashikhmin_shirley:MODEL",
+            "cloth": f"{_HERE}.cloth:MODEL",
             "measured": f"{_HERE}.measured:MODEL",
         },
         "importer": {

@@ -2,12 +2,13 @@
 
 What rough surfaces return varies on two scales: over the whole quarter turn, and within about α of grazing.
 s = k / (μ + k) stretches the second, and its fourth root draws both together where they are far apart;
-along these, thirteen coefficients are enough.
+along these, thirteen coefficients are enough. A `Family` has such curves for every roughness.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -22,6 +23,8 @@ F64 = npt.NDArray[np.float64]
 DEGREE = 12
 SIZE = 3 + DEGREE + 1
 NODES = 96
+FEW_NODES = 32
+KNOTS = 12
 
 
 def fit(values: Callable[[F64], F64], k: float, least: float = 0.0, power: int = 0, root: int = 1) -> F32:
@@ -30,15 +33,76 @@ def fit(values: Callable[[F64], F64], k: float, least: float = 0.0, power: int =
     `values` of cosines (N,) is approximated as s^power times the polynomial between `least` and 1, at
     Chebyshev's nodes of s^(1/root).
     """
-    high, low = (k / (least + k)) ** (1 / root), (k / (1 + k)) ** (1 / root)
-    x = np.cos((np.arange(NODES) + 0.5) * np.pi / NODES)
+    return _packed(k, least, root, _polynomial(values, k, least, power, root, NODES))
+
+
+def _ends(k: float, least: float, root: int) -> tuple[float, float]:
+    """s^(1/root) at 1 and at `least`."""
+    return (k / (1 + k)) ** (1 / root), (k / (least + k)) ** (1 / root)
+
+
+def _polynomial(
+    values: Callable[[F64], F64], k: float, least: float, power: int, root: int, nodes: int
+) -> F64:
+    low, high = _ends(k, least, root)
+    x = np.cos((np.arange(nodes) + 0.5) * np.pi / nodes)
     s = (low + (high - low) * (x + 1) / 2) ** root
     mu = np.clip(k / s - k, max(least, 1e-9), 1.0)
-    v = values(mu) / s**power
-    found = np.polynomial.chebyshev.chebfit(x, v, DEGREE, w=s**0.25)
+    found = np.polynomial.chebyshev.chebfit(x, values(mu) / s**power, DEGREE, w=s**0.25)
+    made = np.zeros(DEGREE + 1)
+    converted = np.polynomial.chebyshev.cheb2poly(found)
+    made[: len(converted)] = converted
+    return made
+
+
+def _packed(k: float, least: float, root: int, coefficients: F64) -> F32:
+    low, high = _ends(k, least, root)
     slope = 2 / (high - low)
-    made = [k, slope, -1 - slope * low, *np.polynomial.chebyshev.cheb2poly(found)]
-    return np.array(made + [0.0] * (SIZE - len(made)), np.float32)
+    return np.array([k, slope, -1 - slope * low, *coefficients], np.float32)
+
+
+@dataclass(frozen=True, eq=False)
+class Family:
+    """Curves that change smoothly with a number: fits at a few, and polynomials of it between these.
+
+    `table` (KNOTS, DEGREE + 1) has in column j Chebyshev's coefficients, over numbers from `low` to `high`,
+    of the coefficient j of `fit`; `k` is that of a number.
+    """
+
+    table: F64
+    k: Callable[[float], float]
+    low: float
+    high: float
+    root: int
+
+    @classmethod
+    def of(
+        cls,
+        values: Callable[[float, F64], F64],
+        k: Callable[[float], float],
+        low: float,
+        high: float,
+        power: int = 0,
+        root: int = 1,
+    ) -> Family:
+        """Of values(number, cosines (N,))."""
+        y = np.cos((np.arange(KNOTS) + 0.5) * np.pi / KNOTS)
+        rows = []
+        for number in (low + (high - low) * (y + 1) / 2).tolist():
+
+            def one(mu: F64, number: float = number) -> F64:
+                return values(number, mu)
+
+            rows.append(_polynomial(one, k(number), 0.0, power, root, FEW_NODES))
+        table = np.asarray(np.polynomial.chebyshev.chebfit(y, np.array(rows), KNOTS - 1), np.float64)
+        return cls(table, k, low, high, root)
+
+    def at(self, number: float) -> F32:
+        """(SIZE,) the curve of a number, as `fit` makes it."""
+        held = min(max(number, self.low), self.high)
+        y = 2 * (held - self.low) / (self.high - self.low) - 1
+        found = np.asarray(np.polynomial.chebyshev.chebval(y, self.table), np.float64)
+        return _packed(self.k(held), 0.0, self.root, found)
 
 
 @kernel
