@@ -28,8 +28,8 @@ def _rough(name: str, tags: str, colour: str, roughness: float) -> Kept:
 
 
 def _cloth(name: str, tags: str, colour: str, sheen: str, roughness: float) -> Kept:
-    values: dict[str, Value] = {"base_color": _srgb(colour), "sheen": _srgb(sheen), "roughness": roughness}
-    return _kept(name, f"fabric {tags}", "cloth", **values)
+    words = f"fabric {tags}"
+    return _kept(name, words, "cloth", base_color=_srgb(colour), sheen=_srgb(sheen), roughness=roughness)
 
 
 def _coated(name: str, tags: str, colour: str, roughness: float, gloss: float = 1.0) -> Kept:
