@@ -117,7 +117,7 @@ class _Choice:
             "base_color": s.base_color,
             "roughness": s.roughness,
             "ior": min(max(s.ior, 1.01), 3.0),
-            "gloss": s.specular,
+            "gloss": min(s.specular * max(s.f0 / 0.25, 1.0), 1.0),
             "depth": 0.0,
         }
         if s.ior > 3:
@@ -209,6 +209,7 @@ class _Choice:
         for name, texture in s.textures.items():
             if name == NORMAL:
                 textures[name] = texture
+                values[NORMAL] = s.normal_strength
             elif name in known:
                 self._lay(known[name], name, texture, values, textures, model)
             elif name == "roughness" and model in ("plastic", "ward", "ggx-conductor", "ggx-dielectric"):

@@ -1,8 +1,8 @@
 """What light a `Surface` sends where, by the letter of glTF 2.0 and its extensions, in float64.
 
 Khronos glTF 2.0, Appendix B (metallic-roughness: GGX with height-correlated Smith masking, Schlick's Fresnel
-term, a matte part under it), KHR_materials_specular, _ior, _anisotropy, _clearcoat and _sheen (D by Estevez &
-Kulla 2017, V by Neubelt & Pettineo 2013, base scaled by the sheen's albedo). Beyond it the matte part is EON
+term, a matte part under it), KHR_materials_specular, _ior, _anisotropy, _clearcoat and _sheen (fibres by
+Estevez & Kulla 2017, the base scaled by the sheen's albedo). Beyond it the matte part is EON
 (Portsmouth, Kutz & Hill 2024) where it is rough, and metals have the dip before grazing of Kutz, Hašan &
 Edmondson 2021, both as OpenPBR has them. Renderers differ in what they add, such as light that bounces
 between facets. It is here to say how far a surface that was written is from the material that was meant.
@@ -19,6 +19,7 @@ from studio_core.exchange.surface import Surface
 
 F64 = npt.NDArray[np.float64]
 LEAST_ALPHA = 1e-4
+LEAST_FIBRES = 0.07**2
 _COAT = 0.04
 
 
@@ -38,10 +39,10 @@ def reflectance(surface: Surface, wi: npt.ArrayLike, wo: npt.ArrayLike) -> F64:
         alpha = max(mean.clearcoat_roughness**2, LEAST_ALPHA)
         made = made * (1 - share) + share * _lobe(half, light, view, alpha, alpha)[:, None]
     if max(mean.sheen_color) > 0:
-        alpha = max(mean.sheen_roughness**2, 1e-2)
+        alpha = max(mean.sheen_roughness**2, LEAST_FIBRES)
         strongest = max(mean.sheen_color)
         kept = 1 - strongest * np.maximum(_sheen_albedo(alpha, up), _sheen_albedo(alpha, down))
-        fibres = _charlie(half[:, 2], alpha) / (4 * (down + up - down * up))
+        fibres = _charlie(half[:, 2], alpha) * _between(down, up, alpha)
         made = made * np.maximum(kept, 0)[:, None] + np.asarray(mean.sheen_color) * fibres[:, None]
     return np.asarray(np.where(lit[:, None], made, 0.0))
 
@@ -85,6 +86,22 @@ def _charlie(cosine: Any, alpha: float) -> F64:
     return np.asarray((2 + 1 / alpha) * sine ** (1 / alpha) / (2 * np.pi))
 
 
+def _between(down: F64, up: F64, alpha: float) -> F64:
+    """V = G / (4 cos cos) by the published fit of Λ."""
+    weight = (1 - alpha) ** 2
+    ends = ((21.5473, 25.3245), (3.82987, 3.32435), (0.19823, 0.16801), (-1.9776, -1.27393))
+    a, b, c, d, e = (x + (y - x) * weight for x, y in (*ends, (-4.32054, -4.85967)))
+
+    def curve(x: Any) -> Any:
+        return a / (1 + b * x**c) + d * x + e
+
+    def smith(x: F64) -> F64:
+        steep = np.exp(2 * curve(0.5) - curve(np.maximum(1 - x, 1e-9)))
+        return np.asarray(np.where(x < 0.5, np.exp(curve(np.maximum(x, 1e-9))), steep))
+
+    return np.asarray(1 / ((1 + smith(down) + smith(up)) * 4 * down * up))
+
+
 def _sheen_albedo(alpha: float, cosine: F64) -> F64:
     """∫ D V cos over the hemisphere of a white sheen, by the midpoint rule over 48 × 48 directions."""
     mu = (np.arange(24) + 0.5) / 24
@@ -94,7 +111,7 @@ def _sheen_albedo(alpha: float, cosine: F64) -> F64:
     for m in mu:
         half = wi + np.array([np.sqrt(1 - m * m), 0, m])
         up = half[..., 2] / np.maximum(np.linalg.norm(half, axis=-1), 1e-9)
-        values = _charlie(up, alpha) / (4 * (z + m - z * m)) * z
+        values = _charlie(up, alpha) * _between(z, np.full_like(z, m), alpha) * z
         found.append(float(values.mean() * 2 * np.pi))
     return np.asarray(np.interp(cosine, mu, found))
 

@@ -17,7 +17,7 @@ import numpy as np
 
 from studio_core.arrays import frozen_map
 from studio_core.params import Colour, Value
-from studio_core.scene.geometry import Texture
+from studio_core.scene.geometry import Image, Texture
 
 WHITE: Colour = (1.0, 1.0, 1.0)
 BLACK: Colour = (0.0, 0.0, 0.0)
@@ -28,7 +28,8 @@ NORMAL = "normal"
 class Surface:
     """All numbers 0…1 but `ior` (≥ 1) and the angle; colours linear Rec.709.
 
-    `textures` multiply the field that they are named like; a map of normals is named `normal`.
+    `textures` multiply the field that they are named like; a map of normals (`shading.normal_maps`) is named
+    `normal`, `normal_strength` multiplies its slopes.
 
     metallic: 0 dielectric, 1 metal. roughness: α = roughness², of the smaller α where it is anisotropic.
     diffuse_roughness: r of EON (`oren-nayar`). specular, specular_color: weight of a dielectric's reflection,
@@ -54,6 +55,7 @@ class Surface:
     clearcoat: float = 0.0
     clearcoat_roughness: float = 0.0
     opacity: float = 1.0
+    normal_strength: float = 1.0
     textures: Mapping[str, Texture] = field(default_factory=frozen_map)
 
     @property
@@ -74,6 +76,31 @@ class Surface:
             if name != NORMAL:
                 made[name] = times(getattr(self, name), texture)
         return replace(self, textures=frozen_map(), **made)
+
+    def smooth(self) -> Surface:
+        """The matte part without roughness, as bright under an even sky."""
+        if self.diffuse_roughness <= 0 or self.metallic >= 1:
+            return self.plain("diffuse_roughness")
+        r = self.diffuse_roughness
+        mean = (1 + (2 / 3 - 28 / (15 * math.pi)) * r) / (1 + (0.5 - 2 / (3 * math.pi)) * r)
+
+        def returned(albedo: Any) -> Any:
+            """Of EON: ρ Ē / (1 − ρ (1 − Ē)) (Portsmouth, Kutz & Hill 2024)."""
+            return albedo * mean / (1 - albedo * (1 - mean))
+
+        made, textures = self.base_color, dict(self.textures)
+        if "base_color" in textures:
+            from studio_core.shading.materials import linear_rgb
+
+            old = textures["base_color"]
+            pixels = returned(linear_rgb(old.image) * np.asarray(made, np.float32))
+            textures["base_color"] = replace(old, image=Image(pixels.astype(np.float32)))
+            made = WHITE
+        else:
+            red, green, blue = (returned(c) for c in made)
+            made = (red, green, blue)
+        flat = replace(self, base_color=made, textures=frozen_map(textures))
+        return flat.plain("diffuse_roughness")
 
     def plain(self, *names: str) -> Surface:
         """These fields as they are by default, without their pictures."""

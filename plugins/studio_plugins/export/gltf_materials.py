@@ -1,39 +1,32 @@
-"""Materials for glTF 2.0: metallic-roughness, as near as it comes.
+"""Materials for glTF 2.0: metallic-roughness and the KHR_materials extensions, as near as they come.
 
-=============  =====================================================================================
-model          glTF
-=============  =====================================================================================
-lambert        dielectric of roughness 1; its reflection switched off by KHR_materials_specular
-ggx            baseColor, metallic, roughness as they are; KHR_materials_ior where specular ≠ 0.5
-phong          roughness = √α with α² = 2 / (4n + 2); blinn-phong: α² = 2 / (n + 2). Highlight colours
-blinn-phong    become F0 of a dielectric (KHR_materials_specular), or a metal where there is no matte part
-any other      dielectric of roughness 1 in its mean colour, with a note
-=============  =====================================================================================
-
-Pictures of roughness and metal become the green and blue of one. All are double-sided; opacity below 1 is
-blended. How pictures lie becomes KHR_texture_transform.
+What each model becomes stands in `studio_core.exchange.outgoing`; here it is written. Pictures of roughness
+and metal become the green and blue of one, the weight of the reflection the alpha of one; those of what is
+seldom drawn become their mean. All are double-sided; opacity below 1 is blended. How pictures lie becomes
+KHR_texture_transform.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from studio_core.brdfs.albedo import mean_albedo
 from studio_core.contract import Registry
+from studio_core.exchange.outgoing import surface_of
+from studio_core.exchange.surface import BLACK, WHITE, Surface, alike, times
 from studio_core.imaging.encode import encode_png
 from studio_core.imaging.transfer import linear_to_srgb
 from studio_core.scene.geometry import Image, Texture
-from studio_core.scene.nodes import Material, MaterialId, Scene
-from studio_core.shading.materials import Resolved, first_channel, linear, resolve
+from studio_core.scene.nodes import MaterialId, Scene
+from studio_core.shading.materials import first_channel, linear
 from studio_plugins.export.gltf_buffer import Buffer
 
-NO_MATTE = 0.02  # albedo under which a Phong material counts as metal
 Json = dict[str, Any]
+_MEANS = ("clearcoat", "clearcoat_roughness", "sheen_roughness")
 
 
 @dataclass
@@ -55,91 +48,99 @@ class Materials:
         """Index of the material."""
         if key not in self._known:
             self._known[key] = len(self.materials)
-            self.materials.append(self._material(self.scene.material(key)))
+            made = surface_of(self.scene.material(key), self.registry)
+            surface = made.surface.smooth().plain("edge_tint")
+            self.notes += made.told(surface, "glTF")
+            self.materials.append(self.written(surface))
         return self._known[key]
 
-    def _material(self, material: Material) -> Json:
-        resolved = resolve(material, self.registry)
-        if resolved.problem:
-            self.notes.append(resolved.problem)
-        if any(shears(texture) for texture in (*resolved.textures.values(), *resolved.shaping.values())):
-            told = "glTF cannot turn a picture whose sides differ in scale; it is written sheared."
-            self.notes.append(f"{material.name}: {told}")
-        made: Json = {"name": material.name, "doubleSided": True, "extensions": {}}
-        model = resolved.brdf.id
-        if model == "lambert":
-            made["pbrMetallicRoughness"] = self._base(resolved, "base_color", 0.0, 1.0)
-            made["extensions"]["KHR_materials_specular"] = {"specularFactor": 0.0}
-        elif model == "ggx":
-            self._ggx(made, material, resolved)
-        elif model in ("phong", "blinn-phong"):
-            self._phong(made, resolved)
-            self.notes.append(f"{material.name}: glTF has no {resolved.brdf.label}; its nearest was written.")
-        else:
-            self.notes.append(f"{material.name}: glTF has no {resolved.brdf.label}; written as matte.")
-            colour = _mean_colour(resolved)
-            made["pbrMetallicRoughness"] = {
-                "baseColorFactor": colour, "metallicFactor": 0.0, "roughnessFactor": 1.0,
-            }  # fmt: skip
-        if material.opacity < 1:
-            made["alphaMode"] = "BLEND"
-            made["pbrMetallicRoughness"]["baseColorFactor"][3] = float(material.opacity)
-        self.extensions.update(made["extensions"])
-        if not made["extensions"]:
-            del made["extensions"]
-        return made
-
-    def _base(self, resolved: Resolved, source: str, metallic: float, roughness: float) -> Json:
-        made: Json = {
-            "baseColorFactor": [*_unit(resolved.values[source]), 1.0],
-            "metallicFactor": metallic,
-            "roughnessFactor": roughness,
+    def written(self, surface: Surface) -> Json:
+        """The JSON of a material; what it lacks goes to `notes`."""
+        if any(shears(texture) for texture in surface.textures.values()):
+            self._note(
+                surface, "glTF cannot turn a picture whose sides differ in scale; it is written sheared."
+            )
+        for name in _MEANS:
+            if name in surface.textures:
+                value = times(getattr(surface, name), surface.textures[name])
+                surface = replace(surface.plain(name), **{name: value})
+                self._note(surface, f"the picture of its {name.replace('_', ' ')} was written as its mean.")
+        base = self._base(surface)
+        extensions = {
+            name: told
+            for name, told in self._layers(surface)
+            if told and not (name in _REFLECTION and _bare(surface))
         }
-        if source in resolved.textures:
-            made["baseColorTexture"] = self._colour(resolved.textures[source])
+        made: Json = {"name": surface.name, "doubleSided": True, "pbrMetallicRoughness": base}
+        if extensions:
+            made["extensions"] = extensions
+            self.extensions.update(extensions)
+        if surface.opacity < 1:
+            made["alphaMode"] = "BLEND"
+            base["baseColorFactor"][3] = surface.opacity
         return made
 
-    def _ggx(self, made: Json, material: Material, resolved: Resolved) -> None:
-        values: Any = resolved.values
-        base = self._base(resolved, "base_color", float(values["metallic"]), float(values["roughness"]))
-        made["pbrMetallicRoughness"] = base
-        specular = float(values["specular"])
-        metal, rough = resolved.textures.get("metallic"), resolved.shaping.get("roughness")
-        if metal is not None and rough is not None and not _alike(metal, rough):
+    def _base(self, surface: Surface) -> Json:
+        made: Json = {
+            "baseColorFactor": [*_unit(surface.base_color), 1.0],
+            "metallicFactor": surface.metallic,
+            "roughnessFactor": surface.roughness,
+        }
+        if "base_color" in surface.textures:
+            made["baseColorTexture"] = self._colour(surface.textures["base_color"])
+        metal, rough = (surface.textures.get(name) for name in ("metallic", "roughness"))
+        if metal is not None and rough is not None and not alike(metal, rough):
             told = "glTF lays metal and roughness alike; the picture of the roughness became its mean."
-            self.notes.append(f"{material.name}: {told}")
-            typical: Any = resolved.typical()
-            base["roughnessFactor"], rough = float(typical["roughness"]), None
+            self._note(surface, told)
+            made["roughnessFactor"], rough = times(surface.roughness, rough), None
         if metal is not None or rough is not None:
-            base["metallicRoughnessTexture"] = self._shares(metal, rough)
-        if "specular" in resolved.textures:
-            specular *= float(linear(resolved.textures["specular"].image)[..., 0].mean())
-            self.notes.append(f"{material.name}: glTF takes one reflectance; its texture's mean was written.")
-        if specular != 0.5:
-            root = math.sqrt(0.08 * min(max(specular, 0.0), 1.0))
-            made["extensions"]["KHR_materials_ior"] = {"ior": (1 + root) / (1 - root)}
+            made["metallicRoughnessTexture"] = self._shares(metal, rough)
+        return made
 
-    def _phong(self, made: Json, resolved: Resolved) -> None:
-        values: Any = resolved.values
-        exponent = float(values["exponent"]) * (4 if resolved.brdf.id == "phong" else 1)
-        roughness = math.sqrt(math.sqrt(2 / (exponent + 2)))
-        diffuse, specular = np.array(_unit(values["diffuse"])), np.array(_unit(values["specular"]))
-        excess = np.maximum(diffuse + specular, 1.0)
-        diffuse, specular = diffuse / excess, specular / excess
-        if diffuse.max() < NO_MATTE:
-            made["pbrMetallicRoughness"] = self._base(resolved, "specular", 1.0, roughness)
-            made["pbrMetallicRoughness"]["baseColorFactor"][:3] = specular.tolist()
-            return
-        made["pbrMetallicRoughness"] = self._base(resolved, "diffuse", 0.0, roughness)
-        matte = np.minimum(diffuse / max(1 - specular.max(), 1e-3), 1.0)
-        made["pbrMetallicRoughness"]["baseColorFactor"][:3] = matte.tolist()
-        shine: Json = {"specularColorFactor": (specular / 0.04).tolist()}
-        if "specular" in resolved.textures:
-            shine["specularColorTexture"] = self._colour(resolved.textures["specular"])
-        made["extensions"]["KHR_materials_specular"] = shine
+    def _layers(self, surface: Surface) -> list[tuple[str, Json]]:
+        """Each extension with what it says; nothing where it says nothing."""
+        made: list[tuple[str, Json]] = []
+        if surface.ior != 1.5:
+            made.append(("KHR_materials_ior", {"ior": surface.ior}))
+        shine: Json = {}
+        if surface.specular < 1:
+            shine["specularFactor"] = surface.specular
+        if surface.specular_color != WHITE:
+            shine["specularColorFactor"] = list(surface.specular_color)
+        if "specular" in surface.textures:
+            shine["specularTexture"] = self._weight(surface.textures["specular"])
+        if "specular_color" in surface.textures:
+            shine["specularColorTexture"] = self._colour(surface.textures["specular_color"])
+        made.append(("KHR_materials_specular", shine))
+        if surface.anisotropy > 0:
+            turn = math.radians(surface.anisotropy_rotation)
+            told = {"anisotropyStrength": surface.anisotropy, "anisotropyRotation": turn}
+            made.append(("KHR_materials_anisotropy", told))
+        if surface.clearcoat > 0:
+            told = {
+                "clearcoatFactor": surface.clearcoat,
+                "clearcoatRoughnessFactor": surface.clearcoat_roughness,
+            }
+            made.append(("KHR_materials_clearcoat", told))
+        if surface.sheen_color != BLACK:
+            sheen: Json = {
+                "sheenColorFactor": list(surface.sheen_color),
+                "sheenRoughnessFactor": surface.sheen_roughness,
+            }
+            if "sheen_color" in surface.textures:
+                sheen["sheenColorTexture"] = self._colour(surface.textures["sheen_color"])
+            made.append(("KHR_materials_sheen", sheen))
+        return made
 
     def _colour(self, texture: Texture) -> Json:
         return self._texture(texture, "colour", _encoded(texture.image))
+
+    def _weight(self, texture: Texture) -> Json:
+        """Numbers in the alpha of a white picture."""
+        share = np.rint(np.clip(first_channel(texture.image), 0, 1) * 255).astype(np.uint8)
+        pixels = np.full((*share.shape, 4), 255, np.uint8)
+        pixels[..., 3] = share
+        return self._texture(texture, "weight", pixels)
 
     def _shares(self, metal: Texture | None, rough: Texture | None) -> Json:
         """A picture with roughness in green and metal in blue; what is none is white."""
@@ -167,6 +168,18 @@ class Materials:
             self.extensions.add("KHR_texture_transform")
         return made
 
+    def _note(self, surface: Surface, text: str) -> None:
+        self.notes.append(f"{surface.name}: {text}")
+
+
+_REFLECTION = ("KHR_materials_ior",)
+
+
+def _bare(surface: Surface) -> bool:
+    """Whether an index of refraction would say nothing: metal all over, or no reflection."""
+    metal = surface.metallic >= 1 and "metallic" not in surface.textures
+    return metal or surface.specular <= 0
+
 
 def _transform(texture: Texture) -> Json:
     """KHR_texture_transform: what takes (u, 1 − v) to (place, 1 − place); empty where that is nothing.
@@ -191,10 +204,6 @@ def shears(texture: Texture) -> bool:
     return abs(a * b + c * d) > 1e-6 * max(math.hypot(a, c) * math.hypot(b, d), 1e-30)
 
 
-def _alike(a: Texture, b: Texture) -> bool:
-    return a.affine == b.affine
-
-
 def _sized(texels: npt.NDArray[np.float32], size: tuple[int, ...]) -> npt.NDArray[np.float32]:
     """The nearest texels at another size."""
     rows, columns = (np.arange(n) * had // n for n, had in zip(size, texels.shape, strict=True))
@@ -211,7 +220,3 @@ def _encoded(image: Image) -> npt.NDArray[np.uint8]:
     if pixels.dtype != np.uint8 or image.encoding != "srgb":
         pixels = linear_to_srgb(linear(image)[..., :3])
     return np.repeat(pixels, 3, axis=2) if pixels.shape[2] == 1 else np.ascontiguousarray(pixels[..., :3])
-
-
-def _mean_colour(resolved: Resolved) -> list[float]:
-    return [*_unit(mean_albedo(resolved.brdf, resolved.values)), 1.0]

@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 from oracles.gltf import check, parse, read
 
 from studio_core.errors import InputError
@@ -28,6 +30,7 @@ from studio_core.scene.nodes import (
     SpotLamp,
 )
 from studio_core.scene.transform import Transform, looking
+from studio_core.shading.materials import linear
 from studio_plugins.export.glb import EXPORTER
 from studio_plugins.meshes.gltf import IMPORTER
 
@@ -166,13 +169,17 @@ def test_phong_becomes_the_nearest_gloss(host: PluginHost, parts: Any, tmp_path:
     np.testing.assert_allclose(made["baseColorFactor"][:3], (0.9, 0.6, 0.3))
     np.testing.assert_allclose(made["roughnessFactor"] ** 4, 2 / 402)
     assert len(notes) == 1
+    assert "% off" in notes[0]
     plastic = {"diffuse": (0.5, 0.5, 0.5), "specular": (0.2, 0.2, 0.2), "exponent": 400.0}
     material = Material(id="m", model="blinn-phong", values=plastic)
     document, _, _ = exported(box(material, parts["cube"]()), host, tmp_path)
     made = document["materials"][0]
     assert made["pbrMetallicRoughness"]["metallicFactor"] == 0
     np.testing.assert_allclose(made["pbrMetallicRoughness"]["roughnessFactor"] ** 4, 2 / 402)
-    np.testing.assert_allclose(made["extensions"]["KHR_materials_specular"]["specularColorFactor"], 5.0)
+    ior = made["extensions"]["KHR_materials_ior"]["ior"]
+    weight = made["extensions"]["KHR_materials_specular"]["specularFactor"]
+    np.testing.assert_allclose(weight * ((ior - 1) / (ior + 1)) ** 2, 0.2)
+    assert weight == pytest.approx(0.4)  # what it reflects at the rim
 
 
 def test_textures_of_metal_and_of_light(host: PluginHost, parts: Any, tmp_path: Path) -> None:
@@ -291,3 +298,81 @@ def test_what_hangs_on_the_sky_stays_in_place(room: Scene, host: PluginHost, tmp
     parent = node(document, "Sky")
     assert parent["translation"] == [1.0, 2.0, 3.0]
     assert [document["nodes"][child]["name"] for child in parent["children"]] == ["Alone"]
+
+
+def round_trip(
+    made: Material, mesh: Geometry, host: PluginHost, folder: Path
+) -> tuple[Material, tuple[str, ...]]:
+    _, _, notes = exported(box(made, mesh), host, folder)
+    return IMPORTER.load(folder / "out.glb").materials[0], notes
+
+
+@pytest.mark.parametrize(
+    ("model", "values", "again"),
+    [
+        ("lambert", {"base_color": (0.3, 0.2, 0.1)}, "lambert"),
+        ("ggx-dielectric", {"tint": (0.9, 0.8, 0.7), "ior": 1.7, "roughness": 0.3}, "ggx-dielectric"),
+        ("plastic", {"base_color": (0.3, 0.2, 0.1), "gloss": 0.6, "ior": 1.4, "roughness": 0.3}, "plastic"),
+        ("ward", {"diffuse": (0.0,) * 3, "specular": (0.9, 0.8, 0.7), "direction": 25.0}, "ward"),
+    ],
+)
+def test_models_come_back_as_themselves(
+    host: PluginHost, parts: Any, tmp_path: Path, model: str, values: dict[str, Any], again: str
+) -> None:
+    made = Material(id="m", name="Thing", model=model, values=values)
+    found, notes = round_trip(made, parts["cube"](), host, tmp_path)
+    assert found.model == again
+    for name in {"tint", "ior", "gloss", "direction", "base_color"} & set(values):
+        if (model, name) != ("plastic", "base_color"):  # there the colour below is written as what it returns
+            np.testing.assert_allclose(found.values[name], values[name], rtol=1e-5)
+    assert any("% off" in note for note in notes) == (model != "lambert")
+
+
+def test_sheen_is_written_for_cloth(host: PluginHost, parts: Any, tmp_path: Path) -> None:
+    from studio_core.exchange.surface import Surface
+    from studio_plugins.export.gltf_buffer import Buffer
+    from studio_plugins.export.gltf_materials import Materials
+
+    picture = Texture(Image(np.full((2, 2, 3), 0.5, np.float32)))
+    writer = Materials(Scene(), host, Buffer())
+    made = writer.written(
+        Surface(
+            sheen_color=(0.2, 0.3, 0.4),
+            sheen_roughness=0.6,
+            textures={"sheen_color": picture, "sheen_roughness": picture},
+        )
+    )
+    told = made["extensions"]["KHR_materials_sheen"]
+    assert told["sheenColorFactor"] == [0.2, 0.3, 0.4]
+    assert told["sheenRoughnessFactor"] == pytest.approx(0.3)
+    assert told["sheenColorTexture"] == {"index": 0}
+    assert any("sheen roughness" in note for note in writer.notes)
+
+
+@settings(max_examples=6, suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
+@given(seed=st.integers(0, 1000), gloss=st.floats(0.1, 1), roughness=st.floats(0, 1))
+def test_pictures_come_back_within_eight_bits(
+    host: PluginHost, parts: Any, tmp_path: Path, seed: int, gloss: float, roughness: float
+) -> None:
+    rng = np.random.default_rng(seed)
+    laid = (0.25, 0.125), float(rng.uniform(-90, 90))
+    colour = Texture(Image(rng.random((3, 4, 3), np.float32)), (2.0, 2.0), *laid)
+    share = Texture(Image(rng.random((5, 2, 1), np.float32), "data"), (2.0, 2.0), *laid)
+    made = Material(
+        id="m", model="ggx", values={"roughness": roughness, "metallic": gloss},
+        textures={"base_color": colour, "metallic": share, "roughness": share},
+    )  # fmt: skip
+    found, _ = round_trip(made, parts["cube"](), host, tmp_path)
+    assert set(found.textures) == {"base_color", "metallic", "roughness"}
+    for name, texture in made.textures.items():
+        np.testing.assert_allclose(found.textures[name].affine, texture.affine, atol=1e-6)
+        np.testing.assert_allclose(
+            linear(found.textures[name].image)[..., 0],
+            np.asarray(texture.image.pixels)[..., 0],
+            atol=0.006 if name == "base_color" else 0.5 / 255 + 1e-6,
+        )
+    glossy = Material(id="m", model="plastic", values={"gloss": gloss}, textures={"gloss": share})
+    found, _ = round_trip(glossy, parts["cube"](), host, tmp_path)
+    np.testing.assert_allclose(
+        linear(found.textures["gloss"].image), share.image.pixels, atol=0.5 / 255 + 1e-6
+    )
