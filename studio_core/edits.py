@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
+import math
 from collections.abc import Container, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Protocol, TypeVar
@@ -265,6 +266,38 @@ class SetTexture:
         old = scene.material(self.material)
         textures = _with_entry(old.textures, self.parameter, self.texture)
         return scene.with_materials(dataclasses.replace(old, textures=textures))
+
+
+@dataclass(frozen=True)
+class LayTextures:
+    """Where the pictures of a material lie (`Texture`): all of them, or those of some parameters."""
+
+    material: MaterialId
+    scale: tuple[float, float] = (1.0, 1.0)
+    offset: tuple[float, float] = (0.0, 0.0)
+    rotation: float = 0.0
+    aspect: float = 1.0
+    parameters: tuple[str, ...] = ()
+    label: str = "Lay pictures"
+
+    def __call__(self, scene: Scene) -> Scene:
+        old = scene.material(self.material)
+        unknown = [name for name in self.parameters if name not in old.textures]
+        if unknown:
+            raise EditError(f"{old.name!r} has no picture for {unknown[0]!r}")
+        numbers = (*self.scale, *self.offset, self.rotation, self.aspect)
+        if not all(math.isfinite(number) for number in numbers):
+            raise EditError(f"pictures of {old.name!r} cannot lie at numbers that are not finite")
+        chosen = self.parameters or tuple(old.textures)
+        made = {
+            name: Texture(one.image, self.scale, self.offset, self.rotation, self.aspect)
+            if name in chosen
+            else one
+            for name, one in old.textures.items()
+        }
+        if made == dict(old.textures):
+            return scene
+        return scene.with_materials(dataclasses.replace(old, textures=frozen_map(made)))
 
 
 @dataclass(frozen=True)

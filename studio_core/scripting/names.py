@@ -24,6 +24,7 @@ from studio_core.scene.room import Room
 from studio_core.scene.room_shape import Opening
 from studio_core.scene.transform import Transform, axis_angle, vec3
 from studio_core.scripting import find as finding
+from studio_core.scripting.patterns import Patterns
 from studio_core.scripting.placing import Placing
 from studio_core.scripting.shown import help_text, overview
 from studio_core.session import Session, View
@@ -47,6 +48,7 @@ GROUPS: dict[str, tuple[str, ...]] = {
             "change",
             "assign",
             "replace_material",
+            "lay_pattern",
             "remove",
         ),
         *("add_model", "light_from", "apply", "undo", "redo"),
@@ -73,7 +75,7 @@ def at_once(label: str, work: Callable[[Job], T]) -> T:
     return work(Job(label))
 
 
-class Names(Placing):
+class Names(Placing, Patterns):
     """Fills `namespace` and keeps its `scene` the current one until `close`.
 
     `services` is asked for when something is rendered; `run(label, work)` does what takes long and gives

@@ -221,16 +221,16 @@ def test_pictures_are_laid_repeated_and_taken_away(driver: Driver, tmp_path: Pat
     panel.load_picture("base_color", path)
     driver.until(lambda: "base_color" in driver.document.scene.material("red").textures)
     driver.until(lambda: row.text.text() == "40 × 20")
-    row.repeat.setValue(3.0)
+    row.pattern.repeat.setValue(3.0)
     assert driver.document.scene.material("red").textures["base_color"].scale == (3.0, 3.0)
     driver.until(lambda: row.remove.isEnabled())
     row.remove.click()
     assert not driver.document.scene.material("red").textures
-    assert driver.labels()[1:] == ["Picture of Red"] * 3
+    assert driver.labels()[1:] == ["Picture of Red", "Pattern of Red", "Picture of Red"]
     uneven = Texture(Image(np.ones((4, 4, 1), np.float32)), (2.0, 1.0))
     driver.document.apply(SetTexture("red", "base_color", uneven))
-    driver.until(lambda: row.repeat.value() == 2.0)
-    row.repeat.setValue(4.0)
+    driver.until(lambda: row.pattern.repeat.value() == 2.0)
+    row.pattern.repeat.setValue(4.0)
     assert driver.document.scene.material("red").textures["base_color"].scale == (4.0, 2.0)
 
 
@@ -307,3 +307,32 @@ def test_materials_of_the_shelf(driver: Driver, tmp_path: Path) -> None:
         return {a.text(): a.isEnabled() for a in mine.actions()} if mine is not None else {}
 
     driver.until(lambda: own() == {"Brass, polished": True, "Broken": False})
+
+
+def test_a_pattern_has_a_size_in_metres_and_is_turned(driver: Driver) -> None:
+    flat = Geometry(
+        np.array([[0, 0, 0], [2, 0, 0], [2, 0, -4], [0, 0, -4]], np.float32),
+        np.array([[0, 1, 2], [0, 2, 3]], np.uint32),
+        uvs=np.array([[0, 0], [1, 0], [1, 1], [0, 1]], np.float32),
+    )
+    board = Material(id="board", name="Board", textures={"base_color": Texture(Image(np.ones((4, 8, 3))))})
+    driver.document.apply(AddMaterial(board))
+    panel = choose(driver, "board")
+    row = panel.editor.textures["base_color"].pattern
+    driver.until(lambda: "No object" in row.told.text())
+    assert not row.width_field.isEnabled()
+    fields = {"id": "sheet", "name": "Sheet", "geometry": flat, "materials": ("board",)}
+    driver.document.apply(Add((MeshObject(**fields),)))
+    driver.until(lambda: row.width_field.isEnabled())
+    assert (row.width_field.value(), row.height_field.value()) == pytest.approx((2.0, 4.0))
+    row.width_field.setValue(row.width_field.valueFromText("40 cm"))
+    driver.until(lambda: row.height_field.value() == pytest.approx(0.8))
+    row.keep.setChecked(False)
+    row.height_field.setValue(0.25)
+    driver.until(lambda: row.height_field.value() == pytest.approx(0.25))
+    row.turned.setValue(30.0)
+    driver.until(lambda: driver.document.scene.material("board").textures["base_color"].rotation == 30.0)
+    assert (row.width_field.value(), row.height_field.value()) == pytest.approx((0.4, 0.25))
+    assert driver.labels()[-3:] == ["Pattern of Board"] * 3
+    driver.document.apply(Add((MeshObject(**{**fields, "id": "two", "transform": Transform(scale=1.5)}),)))
+    driver.until(lambda: "Objects differ" in row.told.text())

@@ -11,12 +11,13 @@ import numpy as np
 from PySide6.QtWidgets import QFileDialog, QToolButton, QVBoxLayout, QWidget
 
 from studio_core.contract import Brdf
-from studio_core.edits import Compound, Edit, SetMaterial, SetTexture
+from studio_core.edits import Compound, Edit, LayTextures, SetMaterial, SetTexture
 from studio_core.errors import PluginError
 from studio_core.metals import Metal
 from studio_core.params import ParamInfo, Value, defaults, param_infos
 from studio_core.scene.geometry import Image, Table, Texture
 from studio_core.scene.nodes import Material, MaterialId
+from studio_core.scene.pattern import PatternRuler
 from studio_core.shading.job import Job
 from studio_core.shading.materials import shape_textures
 from studio_ui.context import Context
@@ -52,6 +53,7 @@ class MaterialForm(QWidget):
         self._context, self._tool = context, tool
         self._sink = EditSink(context.editing, self._make, self._label)
         self._built: object = self
+        self._ruler = PatternRuler()
         self._column = QVBoxLayout(self)
         self._column.setContentsMargins(0, 0, 0, 0)
         self._column.setSpacing(GAP)
@@ -81,8 +83,9 @@ class MaterialForm(QWidget):
             every = [{**usual, **material.values} for material in materials]
             mixed = {n for n in usual if any(one[n] != every[-1][n] for one in every)}
             self.form.show_values(every[-1], mixed)
+        lengths = self._ruler.lengths(scene, last.id) if last.textures and self.textures else None
         for name, shown in self.textures.items():
-            shown.show_texture(last.textures.get(name))
+            shown.show_texture(last.textures.get(name), lengths)
         if self.measurement is not None and last.values != self._fitted:
             self.measurement.tell("")  # it was of other values
 
@@ -177,6 +180,7 @@ class MaterialForm(QWidget):
             self._tool,
             lambda: self._ask_picture(name),
             lambda texture: self._put_texture(material, name, texture),
+            lambda texture: self._lay(material, name, texture),
         )
         self.textures[name] = made
         layout.addRow(form_label(f"{label} map", "A picture that the value is multiplied with"), made)
@@ -279,3 +283,12 @@ class MaterialForm(QWidget):
         if material in self._context.document.scene.materials:
             label = f"Picture of {self._context.document.scene.material(material).name}"
             self._context.editing.apply(SetTexture(material, name, texture, label))
+
+    def _lay(self, material: MaterialId, name: str, texture: Texture) -> None:
+        """Another place for this picture and all of the material that lie as it does."""
+        there = self._context.document.scene.materials.get(material)
+        if there is None or name not in there.textures:
+            return
+        alike = tuple(key for key, one in there.textures.items() if one.affine == there.textures[name].affine)
+        laid = (texture.scale, texture.offset, texture.rotation, texture.aspect)
+        self._context.editing.apply(LayTextures(material, *laid, alike, f"Pattern of {there.name}"))

@@ -1,8 +1,7 @@
-"""A picture on a parameter of a material: what it is, another one, none, how often it is repeated."""
+"""A picture on a parameter of a material: what it is, another one, none, and how it lies."""
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Callable
 
 import numpy as np
@@ -10,20 +9,19 @@ from PySide6.QtCore import QSize, Qt
 from PySide6.QtGui import QImage, QPixmap
 from PySide6.QtWidgets import QLabel, QToolButton, QVBoxLayout, QWidget
 
-from studio_core.params import ParamInfo
 from studio_core.scene.geometry import Image, Texture
-from studio_ui.forms.spin import Spin
+from studio_core.scene.pattern import UnitLengths
 from studio_ui.panels.panel import row
+from studio_ui.panels.pattern_row import PatternRow
 
-_REPEAT = ParamInfo(
-    "number", "Repeat", "How often the picture is repeated over the surface's own unit", unit="×", low=0.01,
-    high=1000.0, scale="log",
-)  # fmt: skip
 _ICON = QSize(40, 26)
 
 
 class TextureRow(QWidget):
-    """`ask()` wants another picture, `put(texture)` is an edit; None takes the picture away."""
+    """`ask()` wants another picture, `put(texture)` is an edit; None takes the picture away.
+
+    `lay(texture)` is one too, of all pictures that lie as this one does.
+    """
 
     def __init__(
         self,
@@ -31,10 +29,10 @@ class TextureRow(QWidget):
         tool: Callable[[str, str], QToolButton],
         ask: Callable[[], object],
         put: Callable[[Texture | None], object],
+        lay: Callable[[Texture], object],
     ) -> None:
         super().__init__()
         self._texture: Texture | None = None
-        self._put = put
         self.picture = QLabel()
         self.text = QLabel()
         self.text.setProperty("role", "dim")
@@ -42,40 +40,28 @@ class TextureRow(QWidget):
         load.clicked.connect(lambda: ask())
         self.remove = tool("cancel", "Take the picture away")
         self.remove.clicked.connect(lambda: put(None))
-        self.repeat = Spin(_REPEAT, decimals=2)
-        self.repeat.setToolTip(_REPEAT.doc)
-        self.repeat.valueChanged.connect(self._repeat)
+        self.pattern = PatternRow(tool, lay)
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)
         column.setSpacing(2)
         column.addLayout(row(self.picture, self.text, load, self.remove, stretch=1))
-        self._line = QWidget()
-        told = QLabel("Repeated")
-        told.setProperty("role", "dim")
-        self._line.setLayout(row(told, self.repeat, stretch=1))
-        column.addWidget(self._line)
+        column.addWidget(self.pattern)
 
-    def show_texture(self, texture: Texture | None) -> None:
-        """What lies there now."""
+    def show_texture(self, texture: Texture | None, lengths: UnitLengths | None) -> None:
+        """What lies there now, on surfaces with such lengths."""
         if texture is None or self._texture is None or texture.image is not self._texture.image:
             self.picture.setVisible(texture is not None)
             if texture is not None:
                 self.picture.setPixmap(small_pixmap(texture.image))
         self._texture = texture
         self.remove.setEnabled(texture is not None)
-        self._line.setVisible(texture is not None)
+        self.pattern.setVisible(texture is not None)
         if texture is None:
             self.text.setText("No picture")
             return
         height, width = texture.image.pixels.shape[:2]
         self.text.setText(f"{width} × {height}")
-        self.repeat.show_value(texture.scale[0])
-
-    def _repeat(self, value: float) -> None:
-        old = self._texture
-        if old is not None and abs(value - old.scale[0]) > 1e-9:
-            across, up = old.scale
-            self._put(dataclasses.replace(old, scale=(value, value * up / across if across else value)))
+        self.pattern.show_texture(texture, lengths)
 
 
 def small_pixmap(image: Image) -> QPixmap:

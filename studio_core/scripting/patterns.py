@@ -1,0 +1,54 @@
+"""What scripts do to patterns: lay the pictures of a material by their size in metres, and turn them."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from typing import Any
+
+from studio_core.document import Document
+from studio_core.edits import Compound, LayTextures
+from studio_core.errors import EditError
+from studio_core.scene.nodes import Material, Scene
+from studio_core.scene.pattern import PLAIN, PatternRuler, pattern_size, with_rotation, with_size
+
+
+class Patterns(ABC):
+    """Part of the names that scripts have; each call is one entry of the history."""
+
+    _document: Document
+
+    @property
+    @abstractmethod
+    def scene(self) -> Scene:
+        """The scene as it is now."""
+
+    @abstractmethod
+    def material(self, name: Any) -> Material:
+        """A material as it is now."""
+
+    def lay_pattern(
+        self,
+        material: Any,
+        size: float | tuple[float, float] | None = None,
+        turned: float | None = None,
+    ) -> None:
+        """Make all pictures of a material `size` metres wide (or wide and high), `turned` by degrees.
+
+        Sizes are those on the objects that have it; with one number the proportion stays.
+        """
+        found = self.material(material)
+        if not found.textures:
+            raise EditError(f"{found.name!r} has no pictures")
+        lengths = PatternRuler().lengths(self.scene, found.id) or PLAIN
+        edits = []
+        for name, texture in found.textures.items():
+            made = texture if turned is None else with_rotation(texture, lengths, float(turned))
+            if size is not None:
+                old = pattern_size(made, lengths)
+                both = size if isinstance(size, tuple) else (size, size * old[1] / old[0])
+                if not all(0 < side < float("inf") for side in both):
+                    raise EditError(f"a pattern cannot be {size} m large")
+                made = with_size(made, lengths, both)
+            laid = (made.scale, made.offset, made.rotation, made.aspect)
+            edits.append(LayTextures(found.id, *laid, (name,)))
+        self._document.apply(Compound(f"Pattern of {found.name}", tuple(edits)))
