@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
-import math
 from collections.abc import Container, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Protocol, TypeVar
@@ -282,22 +281,16 @@ class LayTextures:
 
     def __call__(self, scene: Scene) -> Scene:
         old = scene.material(self.material)
-        unknown = [name for name in self.parameters if name not in old.textures]
-        if unknown:
-            raise EditError(f"{old.name!r} has no picture for {unknown[0]!r}")
-        numbers = (*self.scale, *self.offset, self.rotation, self.aspect)
-        if not all(math.isfinite(number) for number in numbers):
-            raise EditError(f"pictures of {old.name!r} cannot lie at numbers that are not finite")
         chosen = self.parameters or tuple(old.textures)
-        made = {
-            name: Texture(one.image, self.scale, self.offset, self.rotation, self.aspect)
-            if name in chosen
-            else one
-            for name, one in old.textures.items()
-        }
-        if made == dict(old.textures):
-            return scene
-        return scene.with_materials(dataclasses.replace(old, textures=frozen_map(made)))
+        made = dict(old.textures)
+        try:
+            for name in chosen:
+                laid = (self.scale, self.offset, self.rotation, self.aspect)
+                made[name] = Texture(old.textures[name].image, *laid)
+        except (KeyError, ValueError) as error:
+            raise EditError(f"the pictures of {old.name!r} cannot lie so: {error}") from None
+        same = made == dict(old.textures)
+        return scene if same else scene.with_materials(dataclasses.replace(old, textures=frozen_map(made)))
 
 
 @dataclass(frozen=True)

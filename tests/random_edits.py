@@ -207,6 +207,11 @@ def _set_texture(dice: Dice) -> Edit:
     return edits.SetTexture(dice.material(), "base_color", dice.rng.choice((None, texture)))
 
 
+def _lay_textures(dice: Dice) -> Edit:
+    scale = (dice.rng.uniform(0.1, 4), dice.rng.uniform(0.1, 4))
+    return edits.LayTextures(dice.material(), scale, (0.1, 0.2), dice.rng.uniform(-180, 180), 1.5)
+
+
 def _set_table(dice: Dice) -> Edit:
     table = Table(np.full((2, 1, 3, 3), dice.rng.uniform(0.0, 0.3), np.float32), "Felt")
     return edits.SetTable(dice.material(), "measurement", dice.rng.choice((None, table)))
@@ -238,6 +243,7 @@ MAKERS: list[Callable[[Dice], Edit]] = [
     *[_remove_material] * 2,
     _set_material,
     _set_texture,
+    _lay_textures,
     _set_table,
     _compound,
     _replace_by_another_kind,

@@ -116,6 +116,7 @@ class Texture:
     uv ↦ scale · (uv, turned) + offset. Turned: the picture lies `rotation` degrees counter-clockwise about
     the origin of uv, where one unit of v is as long as `aspect` units of u. So any size in metres can be
     turned without being sheared, and so can what KHR_texture_transform says: −rotation, with a uniform scale.
+    Raises ValueError for what is not finite.
     """
 
     image: Image
@@ -123,6 +124,10 @@ class Texture:
     offset: tuple[float, float] = (0.0, 0.0)
     rotation: float = 0.0
     aspect: float = 1.0
+
+    def __post_init__(self) -> None:
+        if not all(math.isfinite(n) for n in (*self.scale, *self.offset, self.rotation, self.aspect)):
+            raise ValueError("a picture must lie at finite numbers")
 
     @cached_property
     def affine(self) -> tuple[float, float, float, float, float, float]:

@@ -130,7 +130,7 @@ def test_pictures_are_laid_together_or_one_by_one():
     assert one["base_color"] is textures["base_color"]
     assert one["roughness"].scale == (2.0, 3.0)
     assert LayTextures("oak")(scene) is scene
-    with pytest.raises(EditError, match="no picture for 'metallic'"):
+    with pytest.raises(EditError, match="metallic"):
         LayTextures("oak", parameters=("metallic",))(scene)
-    with pytest.raises(EditError, match="not finite"):
+    with pytest.raises(EditError, match="finite"):
         LayTextures("oak", (np.inf, 1.0))(scene)
