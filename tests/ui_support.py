@@ -169,6 +169,7 @@ class Answers:
     take_over_: bool = True
     version_: int | None = None  # from the newest
     compact_: bool = True
+    delete_: bool = True
     import_: Callable[[ImportQuestion], ImportChoice | None] = staticmethod(lambda question: question.guess)
     photograph_: bool = True
     capture_: bool = True
@@ -208,6 +209,10 @@ class Answers:
     def compact(self, name: str, versions: int) -> bool:
         self.asked.append(f"compact {versions}")
         return self.compact_
+
+    def delete(self, name: str) -> bool:
+        self.asked.append(f"delete {name}")
+        return self.delete_
 
     def import_options(self, question: ImportQuestion) -> ImportChoice | None:
         self.asked.append(question.doubt)

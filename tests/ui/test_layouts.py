@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from PySide6.QtCore import Qt
+from PySide6.QtCore import QByteArray, Qt
 from PySide6.QtWidgets import QScrollArea, QWidget
 from ui_support import Driver, Make, room
 
@@ -121,3 +121,18 @@ def test_panels_scroll_rather_than_clip_in_a_small_window(driver: Driver, layout
         for area in panel.findChildren(QScrollArea):
             inside: QWidget = area.widget()
             assert inside.minimumSizeHint().width() <= area.viewport().width(), name
+
+
+def test_a_panel_that_came_later_stands_behind_its_tab(driver: Driver) -> None:
+    """A layout that was kept by an earlier version knows nothing of it."""
+    layout = driver.window.layout_
+    now, later = ("dock-library".encode("utf-16-be"), "dock-nowhere".encode("utf-16-be"))
+    older = layout.state().data().replace(now, later)
+    layout.show("library")
+    layout.docks["library"].setFloating(True)
+    layout.set_state(QByteArray(older))
+    tabs = driver.window.tabifiedDockWidgets(layout.docks["outliner"])
+    assert [dock.objectName() for dock in tabs] == ["dock-library"]
+    assert not driver.window.panels["outliner"].visibleRegion().isEmpty()
+    assert driver.window.panels["library"].visibleRegion().isEmpty()
+    assert not layout.docks["library"].isHidden()

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from oracles.raycast import nearest
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtGui import QDragEnterEvent, QDragMoveEvent
-from PySide6.QtWidgets import QApplication, QLineEdit
+from PySide6.QtWidgets import QApplication, QLineEdit, QToolButton
 from ui_support import Driver, room
 
 from studio_core.edits import Add, AddMaterial, Assign, SetMaterial, SetTexture
@@ -277,36 +277,14 @@ def test_a_kind_is_fitted_to_a_measurement(driver: Driver) -> None:
     assert driver.document.scene.material("felt").values == {}
 
 
-def test_materials_of_the_shelf(driver: Driver, tmp_path: Path) -> None:
+def test_the_plus_makes_a_material_or_opens_the_library(driver: Driver) -> None:
     panel = panel_of(driver)
-    menu = panel.shelf
-    menu.shelf.folder = tmp_path / "mine"
-    menu.aboutToShow.emit()
-    kinds = {action.text(): action.menu() for action in menu.actions() if action.menu() is not None}
-    assert {"Paint", "Wood", "Metal", "Fabric", "Stone"} <= set(kinds)
-    assert "My materials" not in kinds
-    brass = next(action for action in kinds["Metal"].actions() if action.text() == "Brass, polished")
-    brass.trigger()
-    (chosen,) = panel.chosen
-    made = driver.document.scene.material(chosen)
-    assert (made.name, made.model) == ("Brass, polished", "ggx-conductor")
-    assert driver.labels()[-1] == "Add Brass, polished"
-    brass.trigger()
-    assert driver.document.scene.material(panel.chosen[0]).name == "Brass, polished 2"
-
-    panel.choose(chosen)
-    panel.keep()
-    kept = tmp_path / "mine" / "Brass, polished.lucmat"
-    driver.until(lambda: kept.exists() and not driver.window.context.tasks.running)
-    (tmp_path / "mine" / "Broken.lucmat").write_bytes(b"nothing")
-    menu.read()
-
-    def own() -> dict[str, bool]:
-        menu.aboutToShow.emit()
-        mine = next((a.menu() for a in menu.actions() if a.text() == "My materials"), None)
-        return {a.text(): a.isEnabled() for a in mine.actions()} if mine is not None else {}
-
-    driver.until(lambda: own() == {"Brass, polished": True, "Broken": False})
+    plus = next(b for b in panel.findChildren(QToolButton) if b.toolTip() == "New material")
+    new, library = plus.menu().actions()
+    new.trigger()
+    assert driver.document.scene.material(panel.material).name == "Material"
+    library.trigger()
+    driver.until(lambda: not driver.window.panels["library"].visibleRegion().isEmpty())
 
 
 def test_a_pattern_has_a_size_in_metres_and_is_turned(driver: Driver) -> None:

@@ -63,6 +63,10 @@ class Ask(Protocol):
         """Whether to drop a project's earlier versions for good."""
         ...
 
+    def delete(self, name: str) -> bool:
+        """Whether to delete files for good that no trash takes."""
+        ...
+
     def import_options(self, question: ImportQuestion) -> ImportChoice | None:
         """Unit, axis and place of a model that comes in."""
         ...

@@ -94,6 +94,18 @@ class Dialogs:
         box.exec()
         return box.clickedButton() is shrink
 
+    def delete(self, name: str) -> bool:
+        """Whether something goes for good."""
+        box = QMessageBox(self._parent)
+        box.setIcon(QMessageBox.Icon.Warning)
+        box.setWindowTitle("Delete for good")
+        box.setText(f"Delete {name} for good?")
+        box.setInformativeText("There is no trash here that could keep it.")
+        gone = box.addButton("Delete", QMessageBox.ButtonRole.DestructiveRole)
+        box.setDefaultButton(box.addButton(QMessageBox.StandardButton.Cancel))
+        box.exec()
+        return box.clickedButton() is gone
+
     def import_options(self, question: ImportQuestion) -> ImportChoice | None:
         """Unit, axis and place, with a preview beside a person."""
         dialog = ImportDialog(self._parent, question)

@@ -16,7 +16,11 @@ from studio_ui.settings import Settings
 _VERSION = 1  # stored layouts of another number are left alone
 THIRD_PARTY = "plugin-"  # how the ids of plugins' panels begin
 _HIDDEN = ("console", "capture")  # at first, and what plugins bring
-_TABS = (("history", "cameras", "jobs", "log"), ("properties", "materials", "lighting", "shading"))
+_TABS = (
+    ("outliner", "library"),
+    ("history", "cameras", "jobs", "log"),
+    ("properties", "materials", "lighting", "shading"),
+)
 
 
 class Layout:
@@ -92,7 +96,7 @@ class Layout:
         if geometry:
             self._window.restoreGeometry(QByteArray.fromBase64(geometry.encode()))
         if state:
-            self._window.restoreState(QByteArray.fromBase64(state.encode()), _VERSION)
+            self._restore(QByteArray.fromBase64(state.encode()))
 
     def reset(self) -> None:
         """The docks as at the first start."""
@@ -114,7 +118,21 @@ class Layout:
     def set_state(self, state: QByteArray) -> None:
         """Put the docks where they were."""
         self._before = None
+        self._restore(state)
+
+    def _restore(self, state: QByteArray) -> None:
+        """Panels that were not there when it was kept come behind the tab they belong to."""
         self._window.restoreState(state, _VERSION)
+        written = state.data()
+        for names in _TABS:
+            docks = [self.docks[name] for name in names]
+            known = [dock for dock in docks if dock.objectName().encode("utf-16-be") in written]
+            for dock in docks if known else ():
+                if dock not in known:
+                    dock.setFloating(False)
+                    self._window.tabifyDockWidget(known[0], dock)
+                    dock.setVisible(not known[0].isHidden())
+                    known[0].raise_()
 
     @property
     def picture_only(self) -> bool:

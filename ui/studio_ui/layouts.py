@@ -17,7 +17,7 @@ from studio_ui.settings import Settings
 _KEY = "layouts"
 BUILT_IN: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "furnish": (
-        ("outliner", "history", "jobs", "log", "properties", "materials", "cameras"),
+        ("outliner", "library", "history", "jobs", "log", "properties", "materials", "cameras"),
         ("outliner", "history", "properties"),
     ),
     "light": (

@@ -36,6 +36,8 @@ from studio_ui.hint_bar import HintBar
 from studio_ui.keyboard import Keyboard
 from studio_ui.layout import Layout
 from studio_ui.layouts import Layouts
+from studio_ui.library.library import MaterialLibrary
+from studio_ui.library.taking import Taking
 from studio_ui.look.appearance import Appearance
 from studio_ui.look.badge import Badge
 from studio_ui.menus import Menus
@@ -105,7 +107,15 @@ class MainWindow(QMainWindow):
         features = self._features()
         load = self.transfer.load_environment
         self.drops = Drops(
-            self, context, viewport, self.ask, self.files, self.importing, load, self.capture.take
+            self,
+            context,
+            viewport,
+            self.ask,
+            self.files,
+            self.importing,
+            load,
+            self.capture.take,
+            self.taking,
         )
         room = FirstRoom(context, self.rooms.add, self.viewing.frame_all, self._samples)
         over = self.drops.overlay
@@ -216,8 +226,21 @@ class MainWindow(QMainWindow):
             self.context, self.ask, self.settings, self.files.beside, lambda: self.files.folder
         )
         seen, capture = self.camera_pictures, self.capture_panel
+        self.library = MaterialLibrary(self.context, self.ask)
+        self.taking = Taking(self.context, self.library)
         return all_panels(
-            self.context, shelf, load, self.ask, self.settings, save, self.cameras, seen, capture
+            self.context,
+            shelf,
+            load,
+            self.ask,
+            self.settings,
+            save,
+            self.cameras,
+            seen,
+            capture,
+            self.library,
+            self.taking,
+            lambda: self.layout_.show("library"),
         )
 
     def handlers(self) -> dict[str, Callable[[], object]]:

@@ -9,8 +9,9 @@ from pathlib import Path
 from PySide6.QtCore import QMimeData, QSize
 from PySide6.QtGui import QImageReader
 
+from studio_core.library.lucmat import SUFFIX as MATERIAL
 from studio_ui.files.project_files import SUFFIX
-from studio_ui.objects.material_drag import MIME
+from studio_ui.objects.material_drag import LIBRARY_MIME, MIME
 
 HDR = (".exr", ".hdr", ".tif", ".tiff")
 CAMERAS = (
@@ -32,6 +33,7 @@ class Intent:
     light: Path | None = None
     photograph: bool = False
     material: bool = False
+    materials: tuple[Path, ...] = ()
     capture: tuple[Path, ...] = ()
     problem: str = ""
 
@@ -41,11 +43,14 @@ class Intent:
             or bool(self.models)
             or self.light is not None
             or self.material
+            or bool(self.materials)
             or bool(self.capture)
         )
 
-    def told(self, *, here: bool, options: bool) -> str:
-        """What will happen; `here` where a model has a place to stand on, `options` while Shift is held."""
+    def told(self, *, here: bool, options: bool, whom: str = "") -> str:
+        """What will happen; `here` where a model has a place to stand on, `options` while Shift is held,
+        `whom` a file of one material is held over.
+        """
         if self.problem:
             return self.problem
         if self.project is not None:
@@ -54,9 +59,17 @@ class Intent:
             count = len(self.capture)
             return f"Capture the room's light from {count} photograph{'s' * (count > 1)}"
         parts = []
+        if self.materials and whom:
+            return f"Give {whom} {self.materials[0].stem}"
+        if self.materials:
+            count = len(self.materials)
+            parts.append(
+                f"Add the material {self.materials[0].stem}" if count == 1 else f"Add {count} materials"
+            )
         if self.models:
             what = self.models[0].stem if len(self.models) == 1 else f"{len(self.models)} models"
-            parts.append(f"Add {what} {'here' if here else 'to the scene'}{' with options' * options}")
+            where = "here" if here else "to the scene"
+            parts.append(f"{'add' if parts else 'Add'} {what} {where}{' with options' * options}")
         if self.light is not None:
             parts.append(f"{'light' if parts else 'Light'} the room with {self.light.stem}")
         if self.material:
@@ -74,7 +87,7 @@ def dropped_paths(data: QMimeData) -> list[Path] | None:
 
 def intent(data: QMimeData, known: Collection[str]) -> Intent | None:
     """What a drag means; None when it is nothing for this program. `known` are endings of models."""
-    if data.hasFormat(MIME):
+    if data.hasFormat(MIME) or data.hasFormat(LIBRARY_MIME):
         return Intent(material=True)
     if not data.hasUrls():
         return None
@@ -88,6 +101,7 @@ def intent_of(paths: Sequence[Path], known: Collection[str]) -> Intent:
     """What dropping files would do. With `known` empty everything unknown may be a model."""
     models: list[Path] = []
     lights: list[Path] = []
+    materials: list[Path] = []
     for path in paths:
         problem = _unusable(path)
         if problem:
@@ -97,12 +111,20 @@ def intent_of(paths: Sequence[Path], known: Collection[str]) -> Intent:
             if len(paths) > 1:
                 return Intent(problem="A project is dropped by itself.")
             return Intent(project=path)
-        if ending in HDR or ending in PHOTOGRAPHS or ending in CAMERAS:
+        if ending == MATERIAL:
+            materials.append(path)
+        elif ending in HDR or ending in PHOTOGRAPHS or ending in CAMERAS:
             lights.append(path)
         elif not known or ending in known:
             models.append(path)
         else:
-            return Intent(problem=f"{path.name} is no model, picture of light or project that can be read.")
+            return Intent(
+                problem=f"{path.name} is no model, material, picture of light or project that can be read."
+            )
+    if materials:
+        if lights:
+            return Intent(problem="Materials and pictures of light are dropped one after the other.")
+        return Intent(models=tuple(models), materials=tuple(materials))
     if lights and not models and _photographs(lights):
         return Intent(capture=tuple(lights))
     if len(lights) == 1 and not models and _two_circles(lights[0]):

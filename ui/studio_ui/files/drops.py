@@ -9,6 +9,7 @@ from PySide6.QtCore import QEvent, QObject, QPoint, Qt, QTimer
 from PySide6.QtGui import QDragMoveEvent, QDropEvent
 from PySide6.QtWidgets import QWidget
 
+from studio_core.scene.nodes import NodeId
 from studio_ui.ask import Ask
 from studio_ui.canvas.switch_viewport import SwitchViewport
 from studio_ui.context import Context
@@ -17,7 +18,10 @@ from studio_ui.files.drop_overlay import DropOverlay
 from studio_ui.files.importing import Importing
 from studio_ui.files.landing import Landing, landing
 from studio_ui.files.project_files import ProjectFiles
-from studio_ui.objects.material_drag import dragged_material, drop_material
+from studio_ui.library.taking import Taking
+from studio_ui.objects.material_drag import dragged_entry, dragged_material, drop_material, object_at
+
+Place = tuple[NodeId, int | None]
 
 
 class Drops(QObject):
@@ -33,12 +37,13 @@ class Drops(QObject):
         importing: Importing,
         load_environment: Callable[[Path], object],
         capture: Callable[[Sequence[Path]], object],
+        taking: Taking,
     ) -> None:
         super().__init__(window)
         self.overlay = DropOverlay()
         self._window, self._context, self._viewport, self._ask = window, context, viewport, ask
         self._files, self._importing, self._load = files, importing, load_environment
-        self._capture = capture
+        self._capture, self._taking = capture, taking
         self._intent: Intent | None = None
         window.setAcceptDrops(True)
         window.installEventFilter(self)
@@ -83,7 +88,9 @@ class Drops(QObject):
             return True
         where = self._landing(at) if meant.models else None
         options = bool(event.modifiers() & Qt.KeyboardModifier.ShiftModifier)
-        text = meant.told(here=where is not None, options=options)
+        onto = self._onto(meant, at)
+        whom = self._context.document.scene[onto[0]].name if onto is not None else ""
+        text = meant.told(here=where is not None, options=options, whom=whom)
         self.overlay.tell(text, bad=bool(meant.problem), view=self._context.session.view, where=where)
         # what cannot be done is taken too, so that the reason can be told where it is let go
         event.setDropAction(Qt.DropAction.CopyAction)
@@ -100,16 +107,19 @@ class Drops(QObject):
         event.accept()
         at = self._at(event.position().toPoint())
         if meant.material:
-            material = dragged_material(event.mimeData())
+            material, key = dragged_material(event.mimeData()), dragged_entry(event.mimeData())
             if material is not None and at is not None:
                 drop_material(self._context, self._viewport, material, *at)
+            elif key is not None and at is not None:
+                self._taking.drop(self._viewport, key, *at)
             return True
         where = self._landing(at)
         options = bool(event.modifiers() & Qt.KeyboardModifier.ShiftModifier)
-        QTimer.singleShot(0, self, lambda: self._do(meant, where, options))
+        onto = self._onto(meant, at)
+        QTimer.singleShot(0, self, lambda: self._do(meant, where, options, onto))
         return True
 
-    def _do(self, meant: Intent, where: Landing | None, options: bool) -> None:
+    def _do(self, meant: Intent, where: Landing | None, options: bool, onto: Place | None = None) -> None:
         if meant.problem:
             self._context.journal.write(meant.problem, "problem")
             return
@@ -120,8 +130,16 @@ class Drops(QObject):
             self._capture(meant.capture)
         if meant.light is not None and (not meant.photograph or self._ask.photograph(meant.light.name)):
             self._load(meant.light)
+        if meant.materials:
+            self._taking.take_files(meant.materials, onto)
         if meant.models:
             self._importing.take(meant.models, where, options=options)
+
+    def _onto(self, meant: Intent, at: tuple[float, float] | None) -> Place | None:
+        """The object that a file of one material is held over."""
+        if at is None or meant.models or len(meant.materials) != 1:
+            return None
+        return object_at(self._context, self._viewport, *at)
 
     def _done(self) -> None:
         self._intent = None

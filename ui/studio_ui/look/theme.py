@@ -96,6 +96,10 @@ QToolButton::menu-indicator { image: none; }
 QToolButton#qt_toolbar_ext_button { padding: 0; border: none; }
 QToolButton[role="filter"] { color: $dim; padding: 2px 5px; }
 QToolButton[role="filter"]:checked { background: $raised; color: $text; }
+QToolButton[role="chip"] { color: $dim; padding: 1px 6px; border-color: $border; border-radius: 9px; }
+QToolButton[role="chip"]:hover { color: $text; }
+QToolButton[role="chip"]:focus { border-color: $accent; }
+QToolButton[role="chip"]:checked { background: $accent; color: $on_accent; }
 QToolButton[role="problem"] { color: $problem; padding: 1px 6px; }
 QToolButton[role="warning"] { color: $warning; padding: 1px 6px; }
 QToolButton[role="small"] { padding: 1px; }

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import weakref
 from collections import OrderedDict
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Container, Hashable
 
 from PySide6.QtCore import QSize
 from PySide6.QtGui import QIcon, QPixmap
@@ -29,12 +29,21 @@ class MaterialThumbnails:
         self._icons: dict[MaterialId, tuple[Hashable, QIcon]] = {}
         self._asked: dict[MaterialId, Hashable] = {}
 
-    def icon(self, material: Material, ratio: float) -> QIcon | None:
-        """The newest there is, while the right one is made; None where there never was one."""
+    def icon(
+        self,
+        material: Material,
+        ratio: float,
+        whole: Callable[[], Material] | None = None,
+        mark: Hashable = None,
+    ) -> QIcon | None:
+        """The newest there is, while the right one is made; None where there never was one.
+
+        `whole` reads what `material` leaves out, beside the window; `mark` changes with it.
+        """
         scene, session = self._context.document.scene, self._context.session
         environment = shown_environment(scene)
         pixels = max(round(self._size * ratio), 8)
-        key = (_look(material), light_of(environment), pixels)
+        key = (_look(material), mark, light_of(environment), pixels)
         old = self._icons.get(material.id)
         if old is not None and self._context.editing.busy:
             return old[1]  # the ball beside the form is followed; lists are drawn at rest
@@ -42,7 +51,7 @@ class MaterialThumbnails:
             if self._context.warm and self._asked.get(material.id) != key:
                 self._asked[material.id] = key
                 self._work.thumbnail(
-                    material, environment, pixels, lambda made: self._keep(material.id, key, made)
+                    material, environment, pixels, lambda made: self._keep(material.id, key, made), whole
                 )
             return old[1] if old is not None else None
         self._balls.move_to_end(key)
@@ -60,6 +69,12 @@ class MaterialThumbnails:
             made.addPixmap(pixmap, QIcon.Mode.Selected)  # not tinted
             old = self._icons[material.id] = (shown, made)
         return old[1]
+
+    def only(self, materials: Container[MaterialId]) -> None:
+        """Of what still waits to be made, leave out all others: they are not seen any more."""
+        for material in [m for m in self._asked if m not in materials]:
+            if self._work.forget(material):
+                del self._asked[material]
 
     def _keep(self, material: MaterialId, key: Hashable, made: Ball | None) -> None:
         self._balls[key] = made

@@ -103,9 +103,18 @@ class PreviewWork:
         environment: Environment | None,
         size: int,
         done: Callable[[tuple[Linear, bool] | None], object],
+        whole: Callable[[], Material] | None = None,
     ) -> None:
-        """A ball of so many pixels, and whether in neutral light."""
-        self._ask(material.id, lambda bench: bench.thumbnail(material, environment, size), done)
+        """A ball of so many pixels, and whether in neutral light. `whole` reads what `material` lacks."""
+
+        def make(bench: _Bench) -> tuple[Linear, bool]:
+            return bench.thumbnail(material if whole is None else whole(), environment, size)
+
+        self._ask(material.id, make, done)
+
+    def forget(self, material: str) -> bool:
+        """Make no thumbnail of it after all; False where none waits."""
+        return bool(material) and self._waiting.pop(material, None) is not None
 
     def _ask(
         self, name: str, work: Callable[[_Bench], Any], done: Callable[[Any], object], urgent: bool = False

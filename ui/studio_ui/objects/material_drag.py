@@ -1,4 +1,6 @@
-"""Materials that are dragged: from the list onto a thing in the picture or in the outliner."""
+"""Materials that are dragged: from the scene's list, or from the library, onto a thing in the picture or in
+the outliner.
+"""
 
 from __future__ import annotations
 
@@ -19,6 +21,7 @@ from studio_ui.context import Context
 from studio_ui.objects.choosing import meshes_below
 
 MIME = "application/x-lucarne-material"
+LIBRARY_MIME = "application/x-lucarne-library-material"
 
 
 class Probing(Protocol):
@@ -41,6 +44,18 @@ def dragged_material(data: QMimeData) -> MaterialId | None:
     return bytes(data.data(MIME).data()).decode() if data.hasFormat(MIME) else None
 
 
+def entry_data(key: str) -> QMimeData:
+    """What a drag out of the library carries: the entry's key."""
+    made = QMimeData()
+    made.setData(LIBRARY_MIME, key.encode())
+    return made
+
+
+def dragged_entry(data: QMimeData) -> str | None:
+    """The key of the library's entry that a drag carries, if it carries one."""
+    return bytes(data.data(LIBRARY_MIME).data()).decode() if data.hasFormat(LIBRARY_MIME) else None
+
+
 def assigned(
     scene: Scene, nodes: Iterable[NodeId], material: MaterialId, slot: int | None = None
 ) -> Edit | None:
@@ -61,15 +76,30 @@ def drop_material(context: Context, viewport: Probing, material: MaterialId, x: 
 
     One undo step; False where nothing is seen there that can have a material.
     """
+    place = dropped_on(context, viewport, x, y)
+    if place is None:
+        return False
+    edit = assigned(context.document.scene, (place[0],), material, place[1])
+    return edit is not None and context.editing.apply(edit)
+
+
+def dropped_on(context: Context, viewport: Probing, x: float, y: float) -> tuple[NodeId, int | None] | None:
+    """The same as `object_at`; says so where there is none."""
+    found = object_at(context, viewport, x, y)
+    if found is None:
+        context.journal.write("Drop the material on an object.")
+    return found
+
+
+def object_at(context: Context, viewport: Probing, x: float, y: float) -> tuple[NodeId, int | None] | None:
+    """The object that is seen at a point of the canvas, and the slot there if it has several."""
     probe = viewport.probe(x, y)
     scene = context.document.scene
     node = scene.nodes.get(probe.node) if probe is not None and probe.node is not None else None
     if not isinstance(node, MeshObject):
-        context.journal.write("Drop the material on an object.")
-        return False
+        return None
     slot = slot_at(node.geometry, scene.world(node.id), context.session.view, x, y)
-    edit = assigned(scene, (node.id,), material, slot if len(node.materials) > 1 else None)
-    return edit is not None and context.editing.apply(edit)
+    return node.id, slot if len(node.materials) > 1 else None
 
 
 def slot_at(geometry: Geometry, world: Transform, view: View, x: float, y: float) -> int | None:

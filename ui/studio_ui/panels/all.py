@@ -9,6 +9,9 @@ from PySide6.QtCore import Qt
 from studio_ui.ask import Ask
 from studio_ui.capture.panel import CapturePanel
 from studio_ui.context import Context
+from studio_ui.library.library import MaterialLibrary
+from studio_ui.library.panel import LibraryPanel
+from studio_ui.library.taking import Taking
 from studio_ui.panels.cameras import CamerasPanel
 from studio_ui.panels.console import ConsolePanel
 from studio_ui.panels.environment_shelf import EnvironmentShelf
@@ -37,18 +40,26 @@ def all_panels(
     cameras: Cameras,
     pictures: CameraPictures,
     capture: CapturePanel,
+    library: MaterialLibrary,
+    taking: Taking,
+    open_library: Callable[[], object],
 ) -> list[tuple[Panel, Qt.DockWidgetArea]]:
     """The panels in the order of the Window menu; tabs are in `layout`."""
     left, right = Qt.DockWidgetArea.LeftDockWidgetArea, Qt.DockWidgetArea.RightDockWidgetArea
     below = Qt.DockWidgetArea.BottomDockWidgetArea
+    outliner, materials = OutlinerPanel(context), MaterialsPanel(context, library, open_library)
+    taking.taken = materials.choose
+    materials.list.dropped = taking.add_key
+    outliner.model.given = taking.give_key
     return [
-        (OutlinerPanel(context), left),
+        (outliner, left),
+        (LibraryPanel(context, library, taking, materials.work), left),
         (HistoryPanel(context), left),
         (CamerasPanel(context, cameras, pictures), left),
         (JobsPanel(context), left),
         (LogPanel(context), left),
         (PropertiesPanel(context), right),
-        (MaterialsPanel(context), right),
+        (materials, right),
         (LightingPanel(context, shelf, load_environment, ask.folder), right),
         (ShadingPanel(context), right),
         (ConsolePanel(context, ask, settings, save), below),

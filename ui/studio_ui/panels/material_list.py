@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 
-from PySide6.QtCore import QItemSelectionModel, QMimeData, QPoint, QSignalBlocker, QSize, Qt
-from PySide6.QtGui import QColor, QDrag, QIcon, QShowEvent
+from PySide6.QtCore import QItemSelectionModel, QMimeData, QPoint, QSignalBlocker, QSize, Qt, QTimer
+from PySide6.QtGui import QColor, QDrag, QDragEnterEvent, QDragMoveEvent, QDropEvent, QIcon, QShowEvent
 from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QTreeWidget, QTreeWidgetItem
 
 from studio_core.scene.nodes import Material, MaterialId, MeshObject, Scene
 from studio_ui.look.theme import DARK, Theme
-from studio_ui.objects.material_drag import MIME, material_data
+from studio_ui.objects.material_drag import LIBRARY_MIME, MIME, dragged_entry, material_data
 from studio_ui.panels.swatch import SIZE, swatch
 
 _NAME, _USERS = 0, 1
@@ -22,12 +22,14 @@ class MaterialList(QTreeWidget):
     """`chosen(materials)` and `renamed(material, name)` tell of the hand.
 
     `picture(material, ratio)` is asked while the list is seen; where it has none a swatch stands in.
+    `dropped(key)`: an entry of the library was dropped here.
     """
 
     def __init__(self) -> None:
         super().__init__()
         self.chosen: Callable[[tuple[MaterialId, ...]], object] = lambda materials: None
         self.renamed: Callable[[MaterialId, str], object] = lambda material, name: None
+        self.dropped: Callable[[str], object] = lambda key: None
         self.picture: Callable[[Material, float], QIcon | None] = lambda material, ratio: None
         self.rows: dict[MaterialId, QTreeWidgetItem] = {}
         self._wanted = ""
@@ -43,7 +45,8 @@ class MaterialList(QTreeWidget):
         self.setSelectionMode(QAbstractItemView.SelectionMode.ExtendedSelection)
         triggers = QAbstractItemView.EditTrigger
         self.setEditTriggers(triggers.DoubleClicked | triggers.EditKeyPressed)
-        self.setDragDropMode(QAbstractItemView.DragDropMode.DragOnly)
+        self.setDragDropMode(QAbstractItemView.DragDropMode.DragDrop)
+        self.setDropIndicatorShown(False)
         self.setContextMenuPolicy(Qt.ContextMenuPolicy.CustomContextMenu)
         header = self.header()
         header.setStretchLastSection(False)
@@ -139,6 +142,28 @@ class MaterialList(QTreeWidget):
         drag.setPixmap(item.icon(_NAME).pixmap(QSize(SIZE, SIZE)))
         drag.setHotSpot(QPoint(-6, -6))
         drag.exec(Qt.DropAction.CopyAction)
+
+    def dragEnterEvent(self, event: QDragEnterEvent) -> None:
+        """Materials of the library."""
+        self.dragMoveEvent(event)
+
+    def dragMoveEvent(self, event: QDragMoveEvent) -> None:
+        """The same, wherever in the list."""
+        if event.mimeData().hasFormat(LIBRARY_MIME):
+            event.setDropAction(Qt.DropAction.CopyAction)
+            event.accept()
+        else:
+            event.ignore()
+
+    def dropEvent(self, event: QDropEvent) -> None:
+        """They come into the scene."""
+        key = dragged_entry(event.mimeData())
+        if key is None:
+            event.ignore()
+            return
+        event.setDropAction(Qt.DropAction.CopyAction)
+        event.accept()
+        QTimer.singleShot(0, self, lambda: self.dropped(key))
 
     def supportedDropActions(self) -> Qt.DropAction:
         """It stays in the list."""

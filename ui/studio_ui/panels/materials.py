@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Callable
 from pathlib import Path
 
 from PySide6.QtCore import QPoint, Qt, QTimer
@@ -15,16 +16,17 @@ from studio_core.scene.nodes import Material, MaterialId, MeshObject, Scene, new
 from studio_ui.context import Context
 from studio_ui.forms.fields import Combo
 from studio_ui.forms.param_form import ParamForm
+from studio_ui.library.library import MaterialLibrary
 from studio_ui.look.theme import Theme
 from studio_ui.material_view.strip import MaterialStrip
 from studio_ui.material_view.thumbnails import MaterialThumbnails
 from studio_ui.material_view.work import PreviewWork
 from studio_ui.objects.choosing import meshes_below, users
 from studio_ui.objects.material_drag import assigned
+from studio_ui.objects.new_material import free_name
 from studio_ui.panels.material_form import MaterialForm
 from studio_ui.panels.material_list import MaterialList, users_of
 from studio_ui.panels.panel import Panel, row
-from studio_ui.panels.shelf_menu import ShelfMenu
 from studio_ui.panels.swatch import SIZE
 
 _WHAT_CHANGES_USERS = Aspect.STRUCTURE | Aspect.MATERIAL
@@ -32,13 +34,16 @@ _WHAT_LIGHTS = Aspect.STRUCTURE | Aspect.LIGHT | Aspect.GAIN
 
 
 class MaterialsPanel(Panel):
-    """Choosing an object chooses its material here."""
+    """Choosing an object chooses its material here. `open_library()` shows the library's panel."""
 
     id = "materials"
     title = "Materials"
 
-    def __init__(self, context: Context) -> None:
+    def __init__(
+        self, context: Context, library: MaterialLibrary, open_library: Callable[[], object]
+    ) -> None:
         super().__init__(context)
+        self._library = library
         self.chosen: tuple[MaterialId, ...] = ()
         self.list = MaterialList()
         self.list.chosen = self._chosen
@@ -58,8 +63,10 @@ class MaterialsPanel(Panel):
         add = self.tool("add", "New material")
         copy = self.tool("duplicate", "Duplicate the chosen material")
         self.users = self.tool("select", "Choose the objects that have the chosen materials")
-        self.shelf = ShelfMenu(context, self.add, self.take)
-        add.setMenu(self.shelf)
+        new = QMenu(add)
+        new.addAction("New material", self.add)
+        new.addAction("From the library…", open_library)
+        add.setMenu(new)
         add.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
         copy.clicked.connect(self.copy)
         self.users.clicked.connect(self.select_users)
@@ -216,27 +223,27 @@ class MaterialsPanel(Panel):
         """A new material."""
         models = self.context.host.names("brdf")
         model = "ggx" if "ggx" in models else next(iter(models), "lambert")
-        made = Material(id=new_id("material"), name=self._free_name("Material"), model=model)
+        name = free_name(self.context.document.scene, "Material")
+        made = Material(id=new_id("material"), name=name, model=model)
         if self.context.editing.apply(AddMaterial(made)):
             self.choose(made.id)
 
-    def take(self, kept: Kept) -> None:
-        """A material of the shelf."""
-        made = dataclasses.replace(kept.material, id=new_id("material"), name=self._free_name(kept.name))
-        if self.context.editing.apply(AddMaterial(made, f"Add {made.name}")):
-            self.choose(made.id)
-
     def keep(self) -> None:
-        """Put the chosen ones on the shelf."""
-        for material in self.chosen:
-            self.shelf.keep(self.context.document.scene.material(material))
+        """Put the chosen ones into the library."""
+        self._library.keep([self.context.document.scene.material(material) for material in self.chosen])
+
+    def export(self) -> None:
+        """The chosen ones as files of their own."""
+        scene = self.context.document.scene
+        self._library.export_kept([Kept(scene.material(material)) for material in self.chosen])
 
     def copy(self) -> None:
         """A copy of the chosen one."""
         if self.material is None:
             return
         old = self.context.document.scene.material(self.material)
-        made = dataclasses.replace(old, id=new_id("material"), name=self._free_name(old.name))
+        name = free_name(self.context.document.scene, old.name)
+        made = dataclasses.replace(old, id=new_id("material"), name=name)
         if self.context.editing.apply(AddMaterial(made, f"Duplicate {old.name}")):
             self.choose(made.id)
 
@@ -294,12 +301,8 @@ class MaterialsPanel(Panel):
             assign.setEnabled(self.assign.isEnabled())
             menu.addAction("Select objects that have it", self.select_users)
             menu.addAction("Keep for all projects", self.keep)
+            menu.addAction("Export…", self.export)
             menu.addSeparator()
             menu.addAction("Delete", self.remove)
         menu.addAction("Delete all that no object has", self.remove_unused)
         menu.popup(self.list.viewport().mapToGlobal(place))
-
-    def _free_name(self, name: str) -> str:
-        taken = {m.name for m in self.context.document.scene.materials.values()}
-        stem = name.rstrip("0123456789 ") or name
-        return next(n for n in (name, *(f"{stem} {i}" for i in range(2, 10**6))) if n not in taken)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
 from PySide6.QtCore import QAbstractItemModel, QMimeData, QModelIndex, QPersistentModelIndex, Qt
@@ -15,7 +15,7 @@ from studio_core.scene.nodes import Camera, Environment, Node, NodeId, Scene
 from studio_ui.editing import Editing
 from studio_ui.look.icons import icon
 from studio_ui.look.theme import DARK, Theme
-from studio_ui.objects.material_drag import assigned, dragged_material
+from studio_ui.objects.material_drag import assigned, dragged_entry, dragged_material
 from studio_ui.panels.node_kinds import kind_icon, kind_name
 
 Index = QModelIndex | QPersistentModelIndex
@@ -29,10 +29,12 @@ class OutlinerModel(QAbstractItemModel):
     """Rows are nodes. An edit is told to the views as what it is: rows that come, go, or move, or cells.
 
     So that what is unfolded and chosen stays; the whole is never reset but by another theme.
+    `given(key, nodes)`: an entry of the library was dropped on a node.
     """
 
     def __init__(self, scene: Scene, editing: Editing) -> None:
         super().__init__()
+        self.given: Callable[[str, Sequence[NodeId]], object] = lambda key, nodes: None
         self._editing = editing
         self._scene = scene
         self._children: dict[NodeId | None, list[NodeId]] = {None: []}
@@ -265,7 +267,7 @@ class OutlinerModel(QAbstractItemModel):
         self, data: QMimeData, action: Qt.DropAction, row: int, column: int, parent: Index
     ) -> bool:
         """Nodes anywhere, materials on what can have them."""
-        if dragged_material(data) is not None:
+        if dragged_material(data) is not None or dragged_entry(data) is not None:
             return parent.isValid()
         return data.hasFormat(_MIME)
 
@@ -282,6 +284,11 @@ class OutlinerModel(QAbstractItemModel):
             edit = assigned(self._scene, (target,), material) if target is not None else None
             if edit is not None:
                 self._editing.apply(edit)
+            return False
+        key = dragged_entry(data)
+        if key is not None:
+            if target is not None:
+                self.given(key, (target,))
             return False
         dragged = bytes(data.data(_MIME).data()).decode().split("\n")
         if not all(node in self._scene.nodes for node in dragged):

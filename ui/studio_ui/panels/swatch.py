@@ -23,14 +23,14 @@ def main_colour(material: Material) -> QColor:
     return QColor("#b4b4b0")
 
 
-def swatch(material: Material, ratio: float = 1.0) -> QIcon:
-    """The sample."""
-    pixels = round(SIZE * ratio)
+def swatch(material: Material, ratio: float = 1.0, size: int = SIZE) -> QIcon:
+    """The sample, so many pixels wide at a ratio of 1."""
+    pixels = round(size * ratio)
     pixmap = QPixmap(pixels, pixels)
     pixmap.fill(Qt.GlobalColor.transparent)
     painter = QPainter(pixmap)
     painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-    painter.scale(ratio, ratio)
+    painter.scale(ratio * size / SIZE, ratio * size / SIZE)
     colour = main_colour(material)
     rough = material.values.get("roughness")
     exponent = material.values.get("exponent")

@@ -1,0 +1,263 @@
+"""What is on the person's shelf of materials, as panels see it: read and written beside the window."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
+
+from PySide6.QtCore import QFile
+
+from studio_core.errors import InputError
+from studio_core.folders import user_materials
+from studio_core.library.lucmat import SUFFIX, Kept, write
+from studio_core.library.shelf import Entry, Shelf, file_stem
+from studio_core.scene.nodes import Material
+from studio_core.shading.job import Job
+from studio_core.signal import Signal
+from studio_ui.ask import Ask, Filter
+from studio_ui.context import Context
+from studio_ui.files.importing import importer_of
+
+FILES = Filter("Materials", (SUFFIX,))
+
+
+class MaterialLibrary:
+    """`changed()` when other entries are there; `came(path)` when a material was put on the shelf.
+
+    Nothing is read before somebody asks. Files that other programs put there are seen at the next `read`.
+    """
+
+    def __init__(self, context: Context, ask: Ask, shelf: Shelf | None = None) -> None:
+        if shelf is None:
+            from studio_core.library.presets import PRESETS
+
+            shelf = Shelf(user_materials(), PRESETS)
+        self.shelf = shelf
+        self.changed: Signal[[]] = Signal()
+        self.came: Signal[[Path]] = Signal()
+        self.trash: Callable[[Path], bool] = lambda path: bool(QFile.moveToTrash(str(path)))
+        """Whether a file is in the trash now."""
+        self._context, self._ask = context, ask
+        self._own: tuple[Entry, ...] = ()
+        self._reading = self._again = False
+
+    @property
+    def entries(self) -> tuple[Entry, ...]:
+        """What is built in, then what was there when it was last read."""
+        return (*self.shelf.built_in, *self._own)
+
+    def entry(self, key: str) -> Entry | None:
+        """By its key."""
+        return next((entry for entry in self.entries if entry.key == key), None)
+
+    def read(self) -> None:
+        """Look what is on the shelf now."""
+        if self._reading:
+            self._again = True
+            return
+        self._reading = True
+
+        def look(job: Job) -> tuple[Entry, ...]:
+            return self.shelf.entries()
+
+        def done(entries: tuple[Entry, ...]) -> None:
+            own = tuple(entry for entry in entries if entry.path is not None)
+            if own != self._own:
+                self._own = own
+                self.changed.emit()
+            ended(None)
+
+        def ended(error: Exception | None) -> None:
+            self._reading = False
+            if self._again:
+                self._again = False
+                self.read()
+
+        self._context.tasks.run("Looking for materials", look, done, ended, quiet=True)
+
+    def fetch(self, entries: Sequence[Entry], done: Callable[[list[Kept]], object]) -> None:
+        """Whole materials: at once where they are in memory, else when their files have been read."""
+        if all(entry.kept is not None and entry.whole for entry in entries):
+            done([entry.kept for entry in entries if entry.kept is not None])
+            return
+
+        def look(job: Job) -> list[Kept]:
+            return [self.shelf.fetch(entry) for entry in entries]
+
+        self._context.tasks.run(f"Reading {_names(entries)}", look, done)
+
+    # what is kept
+
+    def keep(self, materials: Sequence[Material], tags: Iterable[str] = ()) -> None:
+        """Put materials on the shelf, for all projects."""
+        words = tuple(tags)
+
+        def put(job: Job) -> list[Path]:
+            return [self.shelf.add(material, words) for material in materials]
+
+        def done(paths: list[Path]) -> None:
+            names = ", ".join(path.stem for path in paths)
+            self._context.journal.write(f"Kept for all projects: {names}.")
+            self._put(paths)
+
+        if materials:
+            what = materials[0].name if len(materials) == 1 else f"{len(materials)} materials"
+            self._context.tasks.run(f"Keeping {what}", put, done, lambda error: self.read())
+
+    def copy(self, entries: Sequence[Entry]) -> None:
+        """Copies of entries among one's own, to be changed."""
+
+        def put(job: Job) -> list[Path]:
+            found = [self.shelf.fetch(entry) for entry in entries]
+            return [self.shelf.add(kept.material, kept.tags, kept.about) for kept in found]
+
+        self._context.tasks.run(f"Copying {_names(entries)}", put, self._put)
+
+    def rename(self, entry: Entry, name: str) -> None:
+        """Another name, for the material and its file."""
+        if name and name != entry.name:
+            self._change(entry, lambda: self.shelf.change(entry, name=name))
+
+    def tag(self, entry: Entry, tags: Sequence[str]) -> None:
+        """Other tags."""
+        if tuple(tags) != entry.tags:
+            self._change(entry, lambda: self.shelf.change(entry, tags=tags))
+
+    def ask_tags(self, entries: Sequence[Entry]) -> None:
+        """Ask for the tags of one's own entry; for several, which ones to add."""
+        own = [entry for entry in entries if entry.path is not None and entry.kept is not None]
+        if not own:
+            return
+        title = f"Tags of {own[0].name}" if len(own) == 1 else f"More tags for {len(own)} materials"
+        text = self._ask.text(title, "Words with commas between", ", ".join(own[0].tags * (len(own) == 1)))
+        if text is None:
+            return
+        words = tuple(word.strip() for word in text.split(",") if word.strip())
+        for entry in own:
+            self.tag(entry, words if len(own) == 1 else tuple(dict.fromkeys((*entry.tags, *words))))
+
+    def remove(self, entries: Sequence[Entry]) -> None:
+        """To the trash; where there is none they are deleted after asking."""
+        own = [entry for entry in entries if entry.path is not None]
+        left = [entry for entry in own if entry.path is not None and not self.trash(entry.path)]
+        gone = [entry for entry in own if entry not in left]
+        if gone:
+            self._context.journal.write(f"{_names(gone)} {'is' if len(gone) == 1 else 'are'} in the trash.")
+        if left and self._ask.delete(_names(left)):
+            for entry in left:
+                try:
+                    self.shelf.remove(entry)
+                except InputError as error:
+                    self._context.journal.write(str(error), "problem")
+        self.read()
+
+    # files
+
+    def ask_import(self) -> None:
+        """Ask for files, and put their materials on the shelf."""
+        self.import_files(self._ask.open_files("Import materials", self._filters(), many=True))
+
+    def import_files(self, paths: Sequence[Path]) -> None:
+        """Put the materials of files on the shelf: own ones, measured ones, those of models."""
+        host = self._context.host
+        for path in paths:
+
+            def put(job: Job, path: Path = path) -> tuple[list[Path], tuple[str, ...]]:
+                from studio_core.library.lucmat import read
+
+                if path.suffix.lower() == SUFFIX:
+                    kept = read(path)
+                    return [self.shelf.add(kept.material, kept.tags, kept.about)], ()
+                model = importer_of(host, path).load(path)
+                job.checkpoint()
+                if not model.materials:
+                    raise InputError(f"{path.name} holds no material.")
+                tags = () if model.nodes else ("measured",)
+                return [self.shelf.add(material, tags) for material in model.materials], model.notes
+
+            def done(found: tuple[list[Path], tuple[str, ...]], path: Path = path) -> None:
+                for note in found[1]:
+                    self._context.journal.write(f"{path.name}: {note}", "warning")
+                self._put(found[0])
+
+            self._context.tasks.run(f"Importing {path.name}", put, done, lambda error: self.read())
+
+    def export(self, entries: Sequence[Entry]) -> None:
+        """Ask where to, and write entries there as files of their own."""
+        found = [entry for entry in entries if entry.kept is not None]
+        if found:
+            self.fetch(found, self.export_kept)
+
+    def export_kept(self, found: Sequence[Kept]) -> None:
+        """The same for whole materials: one as a file, several into a folder."""
+        if len(found) == 1:
+            suggested = Path.home() / f"{file_stem(found[0].name)}{SUFFIX}"
+            path = self._ask.save_file(f"Export {found[0].name}", suggested, [FILES])
+            targets = [path] if path is not None else []
+        else:
+            folder = self._ask.folder(f"Export {len(found)} materials")
+            targets = _targets(folder, found) if folder is not None else []
+        if not targets:
+            return
+
+        def put(job: Job) -> None:
+            for path, kept in zip(targets, found, strict=True):
+                write(path, kept)
+
+        def done(_: None) -> None:
+            where = (
+                targets[0].name if len(targets) == 1 else f"{len(targets)} files in {targets[0].parent.name}"
+            )
+            self._context.journal.write(f"Exported {where}.")
+            self.read()  # it may have been the shelf's own folder
+
+        self._context.tasks.run(f"Exporting {found[0].name}", put, done)
+
+    def _filters(self) -> list[Filter]:
+        if not self._context.warm:
+            return [FILES]
+        found = self._context.host.available("importer").values()
+        others = [Filter(importer.label, tuple(importer.extensions)) for importer in found]
+        others = [one for one in others if SUFFIX not in one.extensions]
+        every = tuple(dict.fromkeys((SUFFIX, *(e for one in others for e in one.extensions))))
+        return [Filter("All that holds materials", every), FILES, *others]
+
+    def _change(self, entry: Entry, work: Callable[[], Path]) -> None:
+        def put(job: Job) -> Path:
+            return work()
+
+        def done(path: Path) -> None:
+            self._put([path])
+
+        self._context.tasks.run(f"Changing {entry.name}", put, done, lambda error: self.read())
+
+    def _put(self, paths: Sequence[Path]) -> None:
+        self.read()
+        for path in paths:
+            self.came.emit(path)
+
+
+def _names(entries: Sequence[Entry]) -> str:
+    return entries[0].name if len(entries) == 1 else f"{len(entries)} materials"
+
+
+def _targets(folder: Path, found: Sequence[Kept]) -> list[Path]:
+    """Where each goes in a folder, over nothing that is there."""
+    made: list[Path] = []
+    for kept in found:
+        stem, number = file_stem(kept.name), 2
+        path = folder / f"{stem}{SUFFIX}"
+        while path.exists() or path in made:
+            path = folder / f"{stem} {number}{SUFFIX}"
+            number += 1
+        made.append(path)
+    return made
+
+
+def with_key(entry: Entry) -> Material | None:
+    """An entry's material under its key, for pictures of it."""
+    return dataclasses.replace(entry.kept.material, id=entry.key) if entry.kept is not None else None
+
+
+__all__ = ["FILES", "MaterialLibrary", "with_key"]
