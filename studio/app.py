@@ -21,6 +21,7 @@ from studio_core.contract import Services, ShadingBackend
 from studio_core.document import Document
 from studio_core.errors import LucarneError
 from studio_core.folders import user_cache
+from studio_core.library.lucmat import SUFFIX as MATERIAL
 from studio_core.parallel import Workers
 from studio_core.params import build
 from studio_core.registry import PluginHost
@@ -184,7 +185,8 @@ def _first(studio: Studio, path: Path | None, read_only: bool) -> None:
         files = studio.window.files
         if path is not None:
             files.open(path, read_only=read_only)
-            return
+            if path.suffix.lower() != MATERIAL:
+                return
         if studio.window.settings.recent:
             studio.window.front.start_page.refresh()
         else:

@@ -93,7 +93,7 @@ def _window(given: list[str]) -> int:
         what = "is a folder, not a project" if path.is_dir() else "is neither a verb nor a project file"
         raise InputError(f"{given[0]!r} {what}; verbs: {', '.join(VERBS)}")
     if len(given) > 1:
-        raise InputError("a window shows one project: lucarne [FILE]")
+        raise InputError("a window shows one project or material: lucarne [FILE]")
     reason = why_no_window()
     if reason:
         raise LucarneError(

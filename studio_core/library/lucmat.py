@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from studio_core.errors import ProjectError
+from studio_core.scene.geometry import Texture
 from studio_core.scene.nodes import Material, Scene
 
 SUFFIX = ".lucmat"
@@ -59,10 +60,25 @@ def read(path: Path) -> Kept:
     return Kept(materials[0], _tags(tuple(words)), str(about)[:_LONGEST])
 
 
+def alike(one: Material, other: Material) -> bool:
+    """Whether materials have the same name, model, numbers, pictures and tables."""
+    beside = replace(other, id=one.id, textures=one.textures, tables=one.tables)
+    kinds = ("textures", "tables")
+    if beside != one or any(getattr(one, kind).keys() != getattr(other, kind).keys() for kind in kinds):
+        return False
+    tables = (table.key == other.tables[name].key for name, table in one.tables.items())
+    return all(_same(t, other.textures[name]) for name, t in one.textures.items()) and all(tables)
+
+
+def _same(one: Texture, other: Texture) -> bool:
+    laid = replace(other, image=one.image) == one
+    return laid and (one.image is other.image or one.image.key == other.image.key)
+
+
 def _tags(words: tuple[object, ...]) -> tuple[str, ...]:
     """Each once, in their order, without what is empty."""
     found = (str(word).strip() for word in words)
     return tuple(dict.fromkeys(word for word in found if word))[:_MOST_TAGS]
 
 
-__all__ = ["SUFFIX", "Kept", "read", "write"]
+__all__ = ["SUFFIX", "Kept", "alike", "read", "write"]

@@ -15,7 +15,7 @@ from pathlib import Path
 
 from studio_core.arrays import frozen_map
 from studio_core.errors import InputError, LucarneError
-from studio_core.library.lucmat import SUFFIX, Kept, read, write
+from studio_core.library.lucmat import SUFFIX, Kept, alike, read, write
 from studio_core.scene.nodes import Material
 
 _LONGEST_STEM = 80
@@ -107,6 +107,14 @@ class Shelf:
             number += 1
         write(path, Kept(material, tuple(tags), about))
         return path
+
+    def put(self, kept: Kept) -> Path:
+        """Keep a material in a new file, unless one of that name that looks the same is kept already."""
+        named = [entry for entry in self.entries() if entry.kept is not None and entry.name == kept.name]
+        for entry in named:
+            if entry.path is not None and alike(self.fetch(entry).material, kept.material):
+                return entry.path
+        return self.add(kept.material, kept.tags, kept.about)
 
     def change(self, entry: Entry, name: str | None = None, tags: Iterable[str] | None = None) -> Path:
         """Another name, or other tags, for a kept material; where it is now.

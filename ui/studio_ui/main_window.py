@@ -227,6 +227,8 @@ class MainWindow(QMainWindow):
         )
         seen, capture = self.camera_pictures, self.capture_panel
         self.library = MaterialLibrary(self.context, self.ask)
+        self.library.opened.connect(lambda: self.layout_.show("library"))
+        self.files.material = self.library.open
         self.taking = Taking(self.context, self.library)
         return all_panels(
             self.context,

@@ -23,6 +23,7 @@ plugin = Plugin(
             "measured": f"{_HERE}.measured:MODEL",
         },
         "importer": {
+            "material": f"{_HERE}.material_file:MATERIAL",
             "merl": f"{_HERE}.measured_files:MERL",
             "tabulated": f"{_HERE}.measured_files:TABULATED",
         },

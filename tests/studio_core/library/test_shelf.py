@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import os
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -13,6 +15,7 @@ from studio_core.errors import InputError
 from studio_core.library import shelf as module
 from studio_core.library.lucmat import Kept, read
 from studio_core.library.shelf import Shelf, file_stem, folded
+from studio_core.scene.geometry import Image, Texture
 from studio_core.scene.nodes import Material
 
 
@@ -83,6 +86,46 @@ def test_a_damaged_file_is_listed_with_its_reason(shelf: Shelf) -> None:
     assert names(shelf, "good") == ["Good"]
     shelf.remove(bad)
     assert names(shelf) == ["Brass", "Wall paint", "Good"]
+
+
+def test_the_same_material_is_put_there_once(shelf: Shelf) -> None:
+    oak = Kept(Material(id="a", name="Oak", values={"roughness": 0.5}), ("wood",))
+    path = shelf.put(oak)
+    assert shelf.put(Kept(replace(oak.material, id="b"))) == path
+    other = shelf.put(Kept(replace(oak.material, values={"roughness": 0.6})))
+    assert other.name == "Oak 2.lucmat"
+    assert shelf.put(Kept(replace(oak.material, name="Brass"))).name == "Brass.lucmat", "a preset is no file"
+
+
+def test_names_and_tags_change(shelf: Shelf) -> None:
+    first = shelf.add(material("Oak"), ("wood",), "of Lyon")
+    moved = shelf.change(shelf.entries()[-1], name="Chêne")
+    assert (moved.name, first.exists()) == ("Chêne.lucmat", False)
+    found = read(moved)
+    assert (found.name, found.tags, found.about) == ("Chêne", ("wood",), "of Lyon")
+    assert shelf.change(shelf.entries()[-1], tags=("floor", "oiled")) == moved
+    assert shelf.entries()[-1].tags == ("floor", "oiled")
+    with pytest.raises(InputError, match="Brass belongs to the program"):
+        shelf.change(shelf.entries()[0], name="Gold")
+
+
+def test_large_pictures_stay_in_their_file(shelf: Shelf) -> None:
+    pixels = np.random.default_rng(1).random((640, 640, 3), np.float32)
+    woven = Material(id="m", name="Woven", textures={"base_color": Texture(Image(pixels))})
+    shelf.add(woven)
+    entry = shelf.entries()[-1]
+    assert not entry.whole
+    assert entry.kept is not None
+    assert not entry.kept.material.textures
+    np.testing.assert_array_equal(shelf.fetch(entry).material.textures["base_color"].image.pixels, pixels)
+    moved = shelf.change(entry, name="Cloth")
+    assert "base_color" in read(moved).material.textures
+    assert shelf.put(Kept(replace(woven, name="Cloth"))) == moved
+
+
+def test_tags_that_differ_in_case_are_one(shelf: Shelf) -> None:
+    shelf.add(material("A"), ("Métal", "metal"))
+    assert shelf.tags() == {"metal": 2, "matt": 1, "paint": 1}
 
 
 def test_what_is_built_in_stays(shelf: Shelf) -> None:

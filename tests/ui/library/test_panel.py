@@ -266,6 +266,24 @@ def test_a_material_file_is_dropped_on_the_window(driver: Driver, tmp_path: Path
     assert driver.document.scene["stool"].materials == ("blue",)
 
 
+def test_opening_a_material_keeps_it_once_and_shows_it(
+    driver: Driver, panel: LibraryPanel, tmp_path: Path
+) -> None:
+    path = tmp_path / "Velvet.lucmat"
+    write(path, Kept(Material(id="x", name="Velvet", model="oren-nayar"), ("fabric",)))
+    driver.window.layout_.show("outliner")
+    panel.search.setText("brass")
+    for _ in range(2):
+        driver.window.files.open(path)
+        driver.until(lambda: [entry.name for entry in panel.view.entries] == ["Velvet"])
+    assert not panel.visibleRegion().isEmpty()
+    assert [p.name for p in (tmp_path / "mine").iterdir()] == ["Velvet.lucmat"]
+    driver.window.files.open(tmp_path / "mine" / "Velvet.lucmat")
+    driver.idle()
+    assert len(list((tmp_path / "mine").iterdir())) == 1
+    assert driver.labels() == ["Open"], "the project that is open stays"
+
+
 def test_only_pictures_that_are_seen_are_made(make: Make, tmp_path: Path) -> None:
     driver = make(threads=True)
     driver.show(room())

@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from studio_core.document import Step
+from studio_core.library.lucmat import SUFFIX as MATERIAL
 from studio_core.project.lock import ProjectLock, acquire
 from studio_core.project.records import History
 from studio_core.project.store import newest, save
@@ -42,6 +43,7 @@ class ProjectFiles:
         self.locked_out: ReadOnly | None = None
         self.changed: Signal[[]] = Signal()
         self.opened: Signal[[]] = Signal()
+        self.material: Callable[[Path], object] = lambda path: None
         self.keeper = Keeper(context, executor, settings.folder, thumbnails)
         self.recent = RecentProjects(settings, thumbnails, context.tasks)
         self._context, self._ask, self._settings, self._executor = context, ask, settings, executor
@@ -110,7 +112,13 @@ class ProjectFiles:
             self.open(chosen[0])
 
     def open(self, path: Path, *, read_only: bool = False) -> None:
-        """Open a project after asking about unsaved changes; read-only when somebody else has it open."""
+        """Open a project after asking about unsaved changes; read-only when somebody else has it open.
+
+        A material's file is no project, though it is written as one.
+        """
+        if path.suffix.lower() == MATERIAL:
+            self.material(path)
+            return
         self._guarded(lambda: self._open(path, read_only))
 
     def open_copy(self, path: Path, revision: int | None = None) -> None:

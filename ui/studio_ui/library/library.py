@@ -23,7 +23,8 @@ FILES = Filter("Materials", (SUFFIX,))
 
 
 class MaterialLibrary:
-    """`changed()` when other entries are there; `came(path)` when a material was put on the shelf.
+    """`changed()` when other entries are there; `came(path)` when a material was put on the shelf,
+    `opened()` when the person wants to see it.
 
     Nothing is read before somebody asks. Files that other programs put there are seen at the next `read`.
     """
@@ -36,6 +37,7 @@ class MaterialLibrary:
         self.shelf = shelf
         self.changed: Signal[[]] = Signal()
         self.came: Signal[[Path]] = Signal()
+        self.opened: Signal[[]] = Signal()
         self.trash: Callable[[Path], bool] = lambda path: bool(QFile.moveToTrash(str(path)))
         """Whether a file is in the trash now."""
         self._context, self._ask = context, ask
@@ -94,7 +96,7 @@ class MaterialLibrary:
         words = tuple(tags)
 
         def put(job: Job) -> list[Path]:
-            return [self.shelf.add(material, words) for material in materials]
+            return [self.shelf.put(Kept(material, words)) for material in materials]
 
         def done(paths: list[Path]) -> None:
             names = ", ".join(path.stem for path in paths)
@@ -167,14 +169,13 @@ class MaterialLibrary:
                 from studio_core.library.lucmat import read
 
                 if path.suffix.lower() == SUFFIX:
-                    kept = read(path)
-                    return [self.shelf.add(kept.material, kept.tags, kept.about)], ()
+                    return [self.shelf.put(read(path))], ()
                 model = importer_of(host, path).load(path)
                 job.checkpoint()
                 if not model.materials:
                     raise InputError(f"{path.name} holds no material.")
                 tags = () if model.nodes else ("measured",)
-                return [self.shelf.add(material, tags) for material in model.materials], model.notes
+                return [self.shelf.put(Kept(material, tags)) for material in model.materials], model.notes
 
             def done(found: tuple[list[Path], tuple[str, ...]], path: Path = path) -> None:
                 for note in found[1]:
@@ -182,6 +183,14 @@ class MaterialLibrary:
                 self._put(found[0])
 
             self._context.tasks.run(f"Importing {path.name}", put, done, lambda error: self.read())
+
+    def open(self, path: Path) -> None:
+        """Keep the material of a file, if it is not kept already, and show it."""
+        self.opened.emit()
+        if path.resolve().parent == self.shelf.folder.resolve():
+            self._put([path])
+        else:
+            self.import_files([path])
 
     def export(self, entries: Sequence[Entry]) -> None:
         """Ask where to, and write entries there as files of their own."""

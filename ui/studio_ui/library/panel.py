@@ -24,7 +24,6 @@ from studio_ui.material_view.work import PreviewWork
 from studio_ui.panels.panel import Panel, note, row
 from studio_ui.panels.swatch import swatch
 
-_WHAT_LIGHTS = Aspect.STRUCTURE | Aspect.LIGHT | Aspect.GAIN
 _LOW = 300  # pixels
 _DOWN = (Qt.Key.Key_Down, Qt.Key.Key_Return, Qt.Key.Key_Enter)
 
@@ -38,7 +37,7 @@ class LibraryPanel(Panel):
     def __init__(self, context: Context, library: MaterialLibrary, taking: Taking, work: PreviewWork) -> None:
         super().__init__(context)
         self.library, self.taking = library, taking
-        self.thumbnails = MaterialThumbnails(context, work, BALL)
+        self.thumbnails = MaterialThumbnails(context, work, BALL, neutral=True)
         self.thumbnails.came = lambda material: self.view.redraw(material)
         self.search = QLineEdit()
         self.search.setPlaceholderText("Find by name or tag")
@@ -79,11 +78,12 @@ class LibraryPanel(Panel):
         self.subscriptions.add(
             library.changed.connect(self._changed),
             library.came.connect(self._came),
+            library.opened.connect(self.show_all),
             context.document.changed.connect(self._edited),
             context.session.selected.connect(self._offer),
-            context.session.displayed.connect(self._relight),
-            context.editing.settled.connect(self._relight),
-            context.warmed.connect(self._relight),
+            context.session.displayed.connect(self._redraw),
+            context.editing.settled.connect(self._redraw),
+            context.warmed.connect(self._redraw),
         )
         self.refresh()
 
@@ -193,12 +193,10 @@ class LibraryPanel(Panel):
     def _whole(self, entry: Entry) -> Material:
         return self.library.shelf.fetch(entry).material
 
-    def _relight(self) -> None:
+    def _redraw(self) -> None:
         self.view.viewport().update()
 
     def _edited(self, before: Scene, after: Scene, changes: Changes) -> None:
-        if changes.aspects & _WHAT_LIGHTS and not self.context.editing.busy:
-            self._relight()
         if changes.aspects & (Aspect.STRUCTURE | Aspect.NAME):
             self._offer()
 

@@ -20,11 +20,14 @@ Ball = tuple[Linear, bool]
 
 
 class MaterialThumbnails:
-    """`icon` is there at once or later: then `came(material)` tells. Equal materials share one picture."""
+    """`icon` is there at once or later: then `came(material)` tells. Equal materials share one picture.
 
-    def __init__(self, context: Context, work: PreviewWork, size: int) -> None:
+    `neutral`: in a grey room with a window rather than in the scene's light.
+    """
+
+    def __init__(self, context: Context, work: PreviewWork, size: int, *, neutral: bool = False) -> None:
         self.came: Callable[[MaterialId], object] = lambda material: None
-        self._context, self._work, self._size = context, work, size
+        self._context, self._work, self._size, self._neutral = context, work, size, neutral
         self._balls: OrderedDict[Hashable, Ball | None] = OrderedDict()
         self._icons: dict[MaterialId, tuple[Hashable, QIcon]] = {}
         self._asked: dict[MaterialId, Hashable] = {}
@@ -41,7 +44,7 @@ class MaterialThumbnails:
         `whole` reads what `material` leaves out, beside the window; `mark` changes with it.
         """
         scene, session = self._context.document.scene, self._context.session
-        environment = shown_environment(scene)
+        environment = None if self._neutral else shown_environment(scene)
         pixels = max(round(self._size * ratio), 8)
         key = (_look(material), mark, light_of(environment), pixels)
         old = self._icons.get(material.id)

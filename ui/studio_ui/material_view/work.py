@@ -205,6 +205,8 @@ class _Bench:
     def _lit(self, environment: Environment | None) -> PreviewLight:
         from studio_core.preview.light import environment_key, environment_light
 
+        if environment is None:
+            return environment_light(None)
         key = environment_key(environment)
         if self._light is None or self._wanted != key:
             try:

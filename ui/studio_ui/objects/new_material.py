@@ -6,7 +6,7 @@ import dataclasses
 from collections.abc import Iterable, Sequence
 
 from studio_core.edits import Add, AddMaterial, Compound, Edit
-from studio_core.scene.geometry import Texture
+from studio_core.library.lucmat import alike
 from studio_core.scene.nodes import Material, MaterialId, NodeId, Scene, new_id
 from studio_ui.objects.material_drag import assigned
 
@@ -45,26 +45,8 @@ def given(
 
 
 def twin(scene: Scene, material: Material) -> Material | None:
-    """The scene's material of the same name, model, numbers, pictures and tables."""
-    candidates = (m for m in scene.materials.values() if m.name == material.name)
-    return next((m for m in candidates if _same(m, material)), None)
-
-
-def _same(one: Material, other: Material) -> bool:
-    beside = dataclasses.replace(other, id=one.id, textures=one.textures, tables=one.tables)
-    if (
-        beside != one
-        or one.textures.keys() != other.textures.keys()
-        or one.tables.keys() != other.tables.keys()
-    ):
-        return False
-    tables = (table.key == other.tables[name].key for name, table in one.tables.items())
-    return all(_alike(t, other.textures[name]) for name, t in one.textures.items()) and all(tables)
-
-
-def _alike(one: Texture, other: Texture) -> bool:
-    laid = dataclasses.replace(other, image=one.image) == one
-    return laid and (one.image is other.image or one.image.key == other.image.key)
+    """The scene's material of that name that looks the same."""
+    return next((m for m in scene.materials.values() if alike(m, material)), None)
 
 
 __all__ = ["added", "free_name", "given", "twin"]
