@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,6 +13,7 @@ from studio_core.errors import InputError
 
 if TYPE_CHECKING:
     from studio.headless import Headless
+    from studio_plugins.residual.material import SceneMaterial
     from studio_plugins.residual.result import ResidualFit
     from studio_plugins.residual.samples import Flags, Lights, Samples
 
@@ -24,28 +26,33 @@ def add_options(verb: argparse.ArgumentParser) -> None:
     verb.add_argument("--basis", default="", metavar="NAME", help="of each spot's own part")
     verb.add_argument("--no-refine", action="store_true", help="take lights as given")
     verb.add_argument("--size", type=int, default=256, metavar="N", help="texels a side (default: 256)")
-    verb.add_argument("-o", "--out", type=Path, metavar="OUT.exr", help="the maps, a layer a column")
+    verb.add_argument(
+        "-o", "--out", type=Path, metavar="NAME.lucmat|OUT.exr", help="the material, or its maps as layers"
+    )
     verb.add_argument("--report", type=Path, metavar="OUT.json", help="how it was fitted and how well")
 
 
 def fit_material(options: argparse.Namespace, program: Headless) -> None:
     """`lucarne fit-material`."""
-    import numpy as np
-
     from studio.verbs import check_target, result
-    from studio_core.imaging.encode import write_exr
+    from studio_core.library.lucmat import SUFFIX
     from studio_plugins.residual.fit import fit
+    from studio_plugins.residual.material import SHOWN, scene_material
     from studio_plugins.residual.result import Settings
 
     if not 8 <= options.size <= 2048:
         raise InputError(f"--size {options.size}: maps have 8 to 2048 texels a side")
-    for path, suffix, what in ((options.out, ".exr", "maps"), (options.report, ".json", "reports")):
+    targets = (options.out, (SUFFIX, ".exr"), "materials and maps"), (options.report, (".json",), "reports")
+    for path, suffixes, what in targets:
         if path is not None:
-            check_target(path, (suffix,), what)
+            check_target(path, suffixes, what)
+    for_scene = options.out is not None and options.out.suffix.lower() == SUFFIX
     source = captured_sources.read_source(options, program)
     samples = source.samples
     held = _held(options.holdout, samples.lights)
     settings = Settings(basis=options.basis, refine=0 if options.no_refine else Settings().refine)
+    if for_scene:
+        settings = replace(settings, among=SHOWN)
     with program.job("Fitting") as job:
         made = fit(samples.some(~held), settings, job)
     for note in (*source.notes, *made.notes):
@@ -53,16 +60,38 @@ def fit_material(options: argparse.Namespace, program: Headless) -> None:
     values: dict[str, Any] = {"source": str(options.source), **source.found, "fit": made.report()}
     if held.any():
         values["holdout"] = _errors(made, samples.some(held), bool(settings.refine))
+    if for_scene:
+        found = scene_material(made, options.source.stem)
+        for note in found.notes:
+            program.say(note)
+        values["scene"] = {"off": found.off, "width": found.width}
+        _write_material(options.out, found, made)
+    elif options.out is not None:
+        _write_maps(options.out, made)
     if options.report is not None:
         options.report.write_text(json.dumps(values, indent=1, allow_nan=False), "utf-8")
-    if options.out is not None:
-        if not made.basis.size:
-            raise InputError(
-                "there are no maps to write: no spot has anything of its own that lights bear out"
-            )
-        layers = {f"s{k}": np.ascontiguousarray(made.coefficients[:, :, k]) for k in range(made.basis.size)}
-        write_exr(options.out, layers, {"lucarne:basis": made.basis.name})
     result(options, program, values, _text(values))
+
+
+def _write_material(path: Path, found: SceneMaterial, made: ResidualFit) -> None:
+    """With tags that the library finds it by."""
+    from studio_core.library.lucmat import Kept, write
+
+    wide = f" The pattern is as wide as {found.width:.2f} radii of the ball." if found.width else ""
+    about = f"Captured under {len(made.lights)} lamps; basis {made.basis.name}.{wide}"
+    write(path, Kept(found.material, ("captured",), about))
+
+
+def _write_maps(path: Path, made: ResidualFit) -> None:
+    """A layer a column of the basis."""
+    import numpy as np
+
+    from studio_core.imaging.encode import write_exr
+
+    if not made.basis.size:
+        raise InputError("there are no maps to write: no spot has anything of its own that lights bear out")
+    layers = {f"s{k}": np.ascontiguousarray(made.coefficients[:, :, k]) for k in range(made.basis.size)}
+    write_exr(path, layers, {"lucarne:basis": made.basis.name})
 
 
 def _held(text: str | None, lights: Lights) -> Flags:

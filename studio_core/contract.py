@@ -66,7 +66,8 @@ class Brdf(Protocol):
     wo is (x, y, z); wi is x[count], y[count], z[count]; out is term 0 [count], term 1 [count], … without the
     cosine. Directions with z ≤ 0 give 0. Finite always.
 
-    `textures` are parameters of the coefficients that may have a picture. A model may also have
+    `textures` are parameters of the coefficients that may have a picture, or names of maps that have no
+    parameter: such a name is among `values` only where the material has that picture. A model may also have
     `shape_textures: tuple[str, ...]`, numbers of the shape that may: every vertex then has a shape of its
     own. Coefficients must not depend on these unless they are among `textures` too.
     """
@@ -122,7 +123,8 @@ class TabulatedBrdf(Brdf, Protocol):
     """A reflectance model that reads measured tables of its material.
 
     `shape` alone is that of a plain stand-in, for whoever has no material. Where a table is missing or does
-    not fit, the material is shown as matte grey and the reason is said.
+    not fit, the material is shown as matte grey and the reason is said. With `terms_of(tables)`, which raises
+    as `shape_of`, the number of terms depends on the tables; coefficients may be fewer or more than these.
     """
 
     tables: tuple[str, ...]

@@ -23,7 +23,9 @@ class Bound:
     def __init__(self, inner: TabulatedBrdf, tables: Mapping[str, Table]) -> None:
         self.inner, self.tables = inner, frozen_map(tables)
         self.id, self.label, self.Params = inner.id, inner.label, inner.Params
-        self.terms, self.textures = inner.terms, inner.textures
+        own = getattr(inner, "terms_of", None)
+        self.terms: int = inner.terms if own is None else own(self.tables)
+        self.textures = inner.textures
         self.shape_textures: tuple[str, ...] = tuple(getattr(inner, "shape_textures", ()))
 
     def __eq__(self, other: object) -> bool:
@@ -56,8 +58,14 @@ class Bound:
         return self.inner.shape_of(values, self.tables)
 
     def coefficients(self, values: Mapping[str, npt.NDArray[np.floating[Any]]]) -> npt.NDArray[np.float32]:
-        """Of the model."""
-        return self.inner.coefficients(values)
+        """Of the model, as many as it has terms with these tables."""
+        made = self.inner.coefficients(values)
+        if made.shape[-2] == self.terms:
+            return made
+        own = np.zeros((*made.shape[:-2], self.terms, 3), np.float32)
+        shared = min(self.terms, made.shape[-2])
+        own[..., :shared, :] = made[..., :shared, :]
+        return own
 
 
 def bound(model: TabulatedBrdf, tables: Mapping[str, Table]) -> Bound:

@@ -23,6 +23,8 @@ GRADE = 14.0
 FIRST = (4, 4)  # boxes of the hemisphere along s and φ; the horizon may bend sharply at φ = ±π/2
 POINTS = 7
 ROUNDS = 16
+MOST = 1 << 17
+"""Boxes at a time; where more do not settle, they stay as they are."""
 
 
 @dataclass(frozen=True)
@@ -105,6 +107,8 @@ def over_boxes(
         low, size, rows, box, value = low[keep], size[keep], rows[keep], box[keep], parts[keep]
         if not len(rows):
             return total
+        if len(rows) > MOST:
+            break
     np.add.at(total, box, value)
     return total
 
@@ -114,7 +118,7 @@ def over_hemisphere(
 ) -> F64:
     """(R, K) ∫ f dω for the rows of wo (R, 3); `tolerance` is of one box of some dozens.
 
-    With `floor` it is relative: to the row's integral, or to `floor` times the largest of all rows.
+    With `floor` it is relative: to the row's integral of |f|, or to `floor` times the largest of all rows.
     """
     directions = np.atleast_2d(np.asarray(wo, np.float64))
     low, size = grid(*FIRST)
@@ -122,7 +126,7 @@ def over_hemisphere(
     row = np.repeat(np.arange(rows), count)
 
     def relative(first: F64) -> F64:
-        whole = np.abs(first.reshape(rows, count, -1).sum(axis=1))
+        whole = np.abs(first).reshape(rows, count, -1).sum(axis=1)  # what is odd sums to nothing
         limit = tolerance * np.maximum(whole, (floor or 0.0) * whole.max(axis=0))
         return np.asarray(np.repeat(limit, count, axis=0))
 

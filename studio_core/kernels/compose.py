@@ -3,7 +3,7 @@
 A material's coefficients are constant, affine in the texel of one map (c = plain + slope · texel), or have a
 map of their own. With the first two a vertex needs two colours, whatever the number of terms and lights:
 Σ plain · term and Σ slope · term; a hit is the first plus texel times the second. Only the third kind sums
-terms at every hit.
+terms at every hit; it may have coefficients below 0 (captured materials), so its sums are cut off at 0.
 """
 
 from __future__ import annotations
@@ -197,11 +197,12 @@ def shade_hits(
     In one piece: a kernel that hands arrays to another counts their references at every call.
     """
     found = np.zeros(tables.shape[1], np.float32)
+    zero = np.float32(0)
     for n in range(start, stop):
         f = face[n]
         if f < 0:
             for c in range(3):
-                out[n - start, c] = beside[n, c] if len(beside) else np.float32(0)
+                out[n - start, c] = beside[n, c] if len(beside) else zero
             continue
         i, j, k = np.int64(shown[f, 0]), np.int64(shown[f, 1]), np.int64(shown[f, 2])
         w1, w2 = u[n], v[n]
@@ -235,6 +236,7 @@ def shade_hits(
                     found[t] *= mix(sums[i, t], sums[j, t], sums[k, t], w1, w2)
                 for t in range(0, len(found), 3):
                     red, green, blue = red + found[t], green + found[t + 1], blue + found[t + 2]
+                red, green, blue = max(red, zero), max(green, zero), max(blue, zero)
         out[n - start, 0], out[n - start, 1], out[n - start, 2] = red, green, blue
 
 

@@ -85,7 +85,8 @@ class Balls:
         key = (light.key, size, resolved.brdf, shape.tobytes())
         terms = self._terms.get(key, lambda: self._sum(resolved.brdf, shape, light, size))
         at = disc(size, *_COARSE)  # whatever rings there were: pixels and their places are the same
-        colour = np.einsum("pkc,pkc->pc", terms, self._coefficients(resolved, at.uv), optimize=False)
+        summed = np.einsum("pkc,pkc->pc", terms, self._coefficients(resolved, at.uv), optimize=False)
+        colour = np.maximum(summed, 0)  # captured materials have coefficients below 0
         made = np.zeros((size, size, 4), np.float32)
         made[at.rows, at.columns, :3] = np.nan_to_num(colour, nan=0.0, posinf=3e38, neginf=0.0)
         made[at.rows, at.columns, 3] = at.coverage * material.opacity

@@ -116,9 +116,10 @@ class ErrorMeter:
             )
             true_layers[layer] = (lit.combined(lights) * looks).sum(axis=1)
             true_layers[layer][caught] = lit.irradiance(lights)[caught] * albedo
-        dark = np.zeros((len(chosen), 3), np.float32)
-        shown, true = sum(shown_layers.values(), dark), sum(true_layers.values(), dark)
-        by_layer = {k: compare(shown_layers[k], true_layers[k]) for k in shown_layers}
+        # What is below 0 is cut off once all light is summed.
+        shown = self._compositor.radiance(frame.scene, radiance, seen, table, job, chosen)
+        true = np.maximum(sum(true_layers.values(), np.zeros((len(chosen), 3), np.float32)), 0)
+        by_layer = {k: compare(shown_layers[k], np.maximum(true_layers[k], 0)) for k in shown_layers}
         vertices = self._vertices(radiance, shapes, lighting, casters, frame, table, rng, places, job)
         return MeasuredError(compare(shown, true), vertices, by_layer)
 

@@ -73,6 +73,8 @@ def resolve(material: Material, registry: Registry) -> Resolved:
             shaping[name] = texture
         if name not in brdf.textures:
             continue
+        if name not in infos:
+            values[name] = (1.0, 1.0, 1.0)  # the map itself
         first = next(iter(textures.values()), texture)
         if texture.affine == first.affine:
             textures[name] = texture

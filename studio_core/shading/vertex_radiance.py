@@ -27,7 +27,7 @@ def vertex_radiance(scene: Scene, radiance: Radiance, registry: Registry) -> npt
         else:
             texture = next(iter(resolved.textures.values()))
             weights = _bilinear(table, texture.placed(mesh.uvs[own]))
-        made[own] = (terms[own] * weights).sum(axis=1)
+        made[own] = np.maximum((terms[own] * weights).sum(axis=1), 0)  # captured ones go below 0
     return made
 
 

@@ -14,6 +14,7 @@ from studio.bench.lab_surfaces import library
 from studio.cli import main
 from studio_core.imaging.encode import write_exr
 from studio_core.imaging.io import read_image
+from studio_core.library.lucmat import read
 from studio_plugins.residual.samples import Ball
 
 RIG = Rig(size=(84, 80), ball=Ball(42.3, 40.2, 36.0))
@@ -52,6 +53,17 @@ def test_a_folder_becomes_maps_and_a_report(folder: Path, tmp_path: Path) -> Non
     assert errors["holdout_nmse"] < 1e-3 < errors["parametric_nmse"]
     assert told["fit"]["bytes_per_texel"] == 6
     assert read_image(maps).pixels.shape[:2] == (16, 16)
+
+
+def test_a_folder_becomes_a_material_of_the_library(folder: Path, tmp_path: Path) -> None:
+    file, report = tmp_path / "cloth.lucmat", tmp_path / "r.json"
+    given = ["--lights", str(folder / "lights.lp"), "--size", "16", "--no-refine", "--report", str(report)]
+    assert main(["fit-material", str(folder), *given, "-o", str(file)]) == 0
+    found = read(file)
+    assert found.material.model == "captured"
+    assert "captured" in found.tags
+    assert found.material.textures["albedo"].image.pixels.shape == (16, 16, 3)
+    assert 0 <= json.loads(report.read_text())["scene"]["off"] < 1e-4
 
 
 @pytest.mark.parametrize(

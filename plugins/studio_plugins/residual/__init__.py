@@ -11,6 +11,7 @@ window.
 - the fit: `parametric` (f_r), `bases` (δ*), `tables` (what all texels share), `masks`, `solve` (rank-aware,
   robust), `refine` (light directions and strengths), `fit` puts them in order and chooses
 - what came of it: `result`, `errors`, `splits`, `frames` (tangent space)
+- in a scene: `model` (the reflectance model `captured`), `material` (a fit as a material)
 
 Values are radiance under a light of strength 1, by which a white matte surface that faces it has the value 1
 (irradiance π). The camera looks along −z: x to the right, y up, z towards the camera.
@@ -18,4 +19,9 @@ Values are radiance under a light of strength 1, by which a white matte surface 
 
 from studio_core.contract import API, Plugin
 
-plugin = Plugin(id="residual", label="Residual materials: cloth and stone from photographs", api=API)
+plugin = Plugin(
+    id="residual",
+    label="Residual materials: cloth and stone from photographs",
+    api=API,
+    provides={"brdf": {"captured": "studio_plugins.residual.model:MODEL"}},
+)

@@ -64,22 +64,22 @@ BASES = {
 """All bases, smallest first."""
 
 
-def columns(name: str, light: F32, half: F32, matte: F32, gloss: F32) -> F32:
-    """(..., k) of directions in the texel's frame (..., 3), the matte curve and the highlight (...)."""
+def columns(name: str, light: F32, half: F32, matte: F32, gloss: F32, fade: F32) -> F32:
+    """(..., k) of directions in the texel's frame (..., 3), the matte curve and the highlight (...).
+
+    What depends on directions alone is light without a cosine, times `fade` (...).
+    """
     one = np.ones_like(matte)
     x, y, z = np.moveaxis(light, -1, 0)
-    if name == "half":
-        return half
-    if name == "constant-half":
-        return np.concatenate([one[..., None], half], axis=-1)
-    if name in ("albedo-half", "albedo-light"):
-        return np.concatenate([matte[..., None], half if name == "albedo-half" else light], axis=-1)
-    made: dict[str, list[F32]] = {
-        "none": [],
-        "albedo": [matte],
-        "albedo-gloss": [matte, gloss],
+    own = {"albedo": [matte], "albedo-gloss": [matte, gloss]}
+    own |= {basis: [matte] for basis in ("albedo-half", "albedo-light")}
+    towards = {
+        "half": list(np.moveaxis(half, -1, 0)),
+        "constant-half": [one, *np.moveaxis(half, -1, 0)],
+        "albedo-half": list(np.moveaxis(half, -1, 0)),
+        "albedo-light": [x, y, z],
         "ptm": [x * x, y * y, x * y, x, y, one],
         "harmonics": [one, x, y, z, x * y, y * z, z * x, x * x - y * y, 1.5 * z * z - 0.5],
     }
-    parts = made[name]
+    parts = [*own.get(name, []), *(part * fade for part in towards.get(name, []))]
     return np.stack(parts, axis=-1).astype(np.float32) if parts else np.zeros((*matte.shape, 0), np.float32)

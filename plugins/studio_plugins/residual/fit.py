@@ -245,7 +245,7 @@ def _chosen(
     lights = texels.samples.lights
     every = np.ones(len(lights), np.bool_)
     parts = folds(lights, 2)
-    wanted = [BASES[settings.basis]] if settings.basis else list(BASES.values())
+    wanted = [BASES[name] for name in ((settings.basis,) if settings.basis else settings.among)]
     if not parts or (len(wanted) == 1 and not settings.table and not settings.cautious):
         return Shared(model), wanted[-1], ()
     trial = _Trial(texels, model, parts)

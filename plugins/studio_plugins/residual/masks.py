@@ -13,10 +13,9 @@ import numpy.typing as npt
 
 from studio_core.colour import LUMINANCE
 from studio_plugins.residual.samples import F32, Flags, Samples
-from studio_plugins.residual.shading import Shade
+from studio_plugins.residual.shading import GRAZING, Shade
 
 _LUMINANCE = np.array(LUMINANCE, np.float32)
-GRAZING = 0.05  # n·l under which the terminator begins
 _SHADOW = 0.4  # of what a texel shows under other lights, against the model
 _HIGHLIGHT = 0.15  # share of the model's light that is its highlight
 HIGHLIGHT_ANGLE = np.radians(10.0)

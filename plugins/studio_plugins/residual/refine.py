@@ -10,10 +10,9 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from studio_plugins.residual.masks import GRAZING
 from studio_plugins.residual.parametric import half_vector
 from studio_plugins.residual.samples import F32, F64, Flags, Lights, Samples
-from studio_plugins.residual.shading import Shared, shade
+from studio_plugins.residual.shading import GRAZING, Shared, shade
 
 Indices = npt.NDArray[np.intp]
 _FARTHEST = np.radians(4.0)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from studio_plugins.residual.bases import Basis
+from studio_plugins.residual.bases import BASES, Basis
 from studio_plugins.residual.frames import tangent_frames
 from studio_plugins.residual.masks import Masks
 from studio_plugins.residual.samples import F32, Lights
@@ -22,7 +22,7 @@ class Settings:
     """How to fit.
 
     models: of which the first is taken that no later one betters (`parametric.SHAPES`); basis: of
-    `bases.BASES`, or "" to choose by held-out error; table: may be used where it helps held-out lights;
+    `bases.BASES`, or "" to choose `among` some by held-out error; table: may be used where it helps there;
     refine: rounds of light refinement; cautious: never worse than the model alone on lights held back in
     turn.
     """
@@ -36,6 +36,7 @@ class Settings:
         "rough-two-ggx",
     )
     basis: str = ""
+    among: tuple[str, ...] = tuple(BASES)
     table: bool = True
     refine: int = 3
     masks: Masks = Masks()

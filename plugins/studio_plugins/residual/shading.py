@@ -14,6 +14,8 @@ from studio_plugins.residual.samples import F32, F64
 from studio_plugins.residual.tables import Table
 
 _LUMINANCE = np.array(LUMINANCE, np.float32)
+GRAZING = 0.05
+"""n·l under which the terminator begins."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,8 +47,13 @@ class Shade:
     def columns(self, basis: str, frames: F32) -> F32:
         """(..., k) of a basis in the texels' frames (..., 3, 3)."""
         light, half = to_tangent(self.light, frames), to_tangent(self.middle, frames)
-        made = columns(basis, light, half, self.matte, self.gloss)
-        return np.asarray(made * (self.cosine > 0)[..., None], np.float32)
+        fade = faded(self.cosine)
+        return columns(basis, light, half, self.matte * (fade > 0), self.gloss * (fade > 0), fade)
+
+
+def faded(cosine: F32) -> F32:
+    """1, and on to 0 at the terminator: for light that comes back not in proportion to the cosine."""
+    return np.asarray(np.clip(cosine / np.float32(GRAZING), 0, 1), np.float32)
 
 
 def shade(shared: Shared, normals: F32, views: F32, towards: F64) -> Shade:
@@ -59,7 +66,7 @@ def shade(shared: Shared, normals: F32, views: F32, towards: F64) -> Shade:
     alone = matte + glossy
     whole, rest = alone, matte
     if shared.table is not None:
-        more = shared.table.at(half, cosine)
+        more = shared.table.at(half, cosine) * faded(cosine)[..., None]
         whole, rest = alone + more, np.maximum(matte + more, 0)
     albedo = max(float(shared.parametric.colours[0] @ _LUMINANCE), 1e-6)
     shine = max(

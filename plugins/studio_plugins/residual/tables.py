@@ -14,8 +14,9 @@ import numpy.typing as npt
 
 from studio_plugins.residual.samples import F32
 
-_HALF, _COSINE = 14, 10  # nodes
-_WIDEST = np.radians(75.0)
+NODES = _HALF, _COSINE = 14, 10
+WIDEST = np.radians(75.0)
+"""θ_h of the last node."""
 _SMOOTH, _FADE = 3e-3, 3e-5
 
 
@@ -56,7 +57,7 @@ def fit_table(cosine_half: F32, cosine_light: F32, lacking: F32, weights: F32) -
 
 def _tents(cosine_half: npt.NDArray[Any], cosine_light: npt.NDArray[Any]) -> tuple[Any, Any]:
     theta = np.arccos(np.clip(cosine_half, -1, 1))
-    x = np.sqrt(np.clip(theta / _WIDEST, 0, 1)) * (_HALF - 1)
+    x = np.sqrt(np.clip(theta / WIDEST, 0, 1)) * (_HALF - 1)
     y = np.clip(cosine_light, 0, 1) * (_COSINE - 1)
     i, j = np.minimum(x.astype(np.intp), _HALF - 2), np.minimum(y.astype(np.intp), _COSINE - 2)
     u, v = x - i, y - j

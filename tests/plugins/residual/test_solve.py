@@ -90,7 +90,7 @@ def test_everything_stays_finite(seed: int, condition: float, black: bool) -> No
 @pytest.mark.parametrize("name", list(BASES))
 def test_a_basis_has_the_columns_that_it_says(name: str) -> None:
     d = dome().directions.astype(np.float32)
-    made = columns(name, d, d, d[:, 2], d[:, 2] ** 9)
+    made = columns(name, d, d, d[:, 2], d[:, 2] ** 9, np.ones_like(d[:, 2]))
     assert made.shape == (len(d), BASES[name].size)
     assert np.linalg.matrix_rank(made) == BASES[name].size - (name in ("albedo-half", "albedo-light"))
     assert BASES[name].bytes_per_texel == 6 * BASES[name].size

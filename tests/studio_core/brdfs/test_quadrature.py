@@ -19,6 +19,22 @@ def test_the_hemisphere_is_whole(degrees: float) -> None:
     np.testing.assert_allclose(made[0], [2 * np.pi, np.pi], rtol=1e-4)
 
 
+def test_what_is_odd_or_never_settles_ends() -> None:
+    """A relative tolerance is of |f|: what sums to nothing is not refined for ever."""
+    asked = [0]
+
+    def odd(_: int, wi: np.ndarray) -> np.ndarray:
+        asked[0] += len(wi)
+        return np.stack([wi[:, 1], np.abs(wi[:, 0])], axis=1)
+
+    made = over_hemisphere(odd, [seen_from(40.0, 0.0)], 1e-4, 0.1)[0]
+    np.testing.assert_allclose(made, [0, np.pi], atol=1e-3)
+    assert asked[0] < 100_000
+    rng = np.random.default_rng(0)
+    rough = over_hemisphere(lambda _, wi: rng.random((len(wi), 1)), [seen_from(40.0)], 1e-9)[0, 0]
+    assert rough == pytest.approx(np.pi, rel=0.05)
+
+
 @pytest.mark.parametrize("degrees", [0, 40, 80])
 @pytest.mark.parametrize("exponent", [1.0, 1e2, 1e4, 1e6])
 def test_sharp_lobes_are_found(degrees: float, exponent: float) -> None:

@@ -162,6 +162,15 @@ def test_a_hit_is_its_corners_times_its_texel(kind, distance, level, corners):
     np.testing.assert_allclose(_shade(kind, 0, corners, distance), expected, rtol=1e-5)
 
 
+def test_sums_below_nothing_are_cut_off(monkeypatch):
+    looks, uv_map = _one_triangle(GENERAL)
+    assert (looks[2] > 0).all()
+    darker = (*looks[:4], -looks[4], *looks[5:])
+    monkeypatch.setitem(globals(), "_one_triangle", lambda _: (darker, uv_map))
+    looks[1][:, :3] = 0
+    assert (_shade(GENERAL) == 0).all()
+
+
 def test_what_is_not_hit_shows_what_lies_beside():
     assert not _shade(CONSTANT, face=-1).any()
     beside = np.array([[1, 2, 3]], np.float32)

@@ -154,6 +154,7 @@ void main() {
 #endif
 #ifdef GENERAL
 EACH    light += texel(u_map@, level, v_uv) * v_sum@;
+    light = max(light, 0.0);  // captured materials have coefficients below 0
 #endif
     float away = length(v_eye);
 #ifdef PEELED
