@@ -5,11 +5,13 @@ surface                                            model
 =================================================  ====================================================
 metallic-roughness, index up to 1.79               ggx, exactly
 no reflection at all                               lambert; oren-nayar where the matte part is rough
+cloth: no metal, dull, under a sheen               cloth
 dielectric under a clear coat                      plastic: the coat on the base's colour
 reflection weakened, or an index beyond 1.79       plastic: its gloss and index
 black and no metal                                 ggx-dielectric
 metal with a tint of the rim                       ggx-conductor
 metal with a grain                                 ward
+dielectric with a highlight 2.5 times as long      ashikhmin-shirley
 =================================================  ====================================================
 
 Pictures of what a model has as one number become their mean. Everything that is left out is said.
@@ -30,8 +32,10 @@ MOST_TEXELS = 1 << 22
 """Of pictures of colour and metal together: a table of coefficients takes 48 bytes each."""
 HIGHEST_F0 = 0.08
 LEAST_GRAIN = 0.05
+LONG = 0.4  # width over length of a highlight under which a grain tells more than a round one
 COAT_COUNTS = 0.5
-Say = Callable[[str], None]
+LEAST_SHEEN, DULL = 0.05, 0.4
+Say = Callable[[str], object]
 
 _WORDS = {
     "base_color": "colour",
@@ -67,12 +71,17 @@ class _Choice:
         metal = s.metallic >= 0.5 or "metallic" in textures
         shaped = "roughness" in textures
         f0 = s.f0 * s.specular * max(s.specular_color)
+        dull = s.roughness >= DULL or s.specular <= 0
+        if max(s.sheen_color) >= LEAST_SHEEN and dull and not metal and s.clearcoat < COAT_COUNTS:
+            return self._cloth()
         if s.specular <= 0 and s.metallic <= 0 and s.clearcoat < COAT_COUNTS:
             return self._matte()
         if s.metallic >= 0.5 and s.anisotropy > LEAST_GRAIN:
             return self._brushed()
         if s.metallic >= 0.99 and s.edge_tint != WHITE:
             return self._conductor()
+        if s.alphas[1] < LONG * s.alphas[0] and not metal and s.clearcoat < COAT_COUNTS:
+            return self._satin()
         if s.clearcoat >= COAT_COUNTS and not metal:
             return self._coated()
         if black and s.metallic <= 0:
@@ -88,7 +97,27 @@ class _Choice:
         if s.diffuse_roughness > 0:
             model = "oren-nayar"
             values["roughness"] = s.diffuse_roughness
-        return self._made(model, values, {"base_color": "base_color"}, "diffuse_roughness")
+        return self._made(
+            model,
+            values,
+            {"base_color": "base_color"},
+            "diffuse_roughness",
+            "roughness",
+            rough="diffuse_roughness",
+        )
+
+    def _cloth(self) -> Material:
+        s = self.surface
+        if s.specular > 0:
+            self._tell("what lies below its sheen is matte")
+        values: dict[str, Value] = {
+            "base_color": s.base_color,
+            "sheen": s.sheen_color,
+            "roughness": s.sheen_roughness,
+        }
+        known = {"base_color": "base_color", "sheen_color": "sheen"}
+        told = ("sheen_color", "roughness", "metallic", "specular", "specular_color")
+        return self._made("cloth", values, known, *told, rough="sheen_roughness")
 
     def _ggx(self, f0: float) -> Material:
         s = self.surface
@@ -148,7 +177,7 @@ class _Choice:
             "ior",
             "metallic",
         )
-        return self._made("plastic", values, known, *told)
+        return self._made("plastic", values, known, *told, rough="clearcoat_roughness")
 
     def _clear(self) -> Material:
         s = self.surface
@@ -187,14 +216,44 @@ class _Choice:
             "specular": s.base_color,
             "roughness": float((wide * narrow) ** 0.25),
             "anisotropy": min((1 - ratio) / 0.9, 1.0),
-            "direction": (s.anisotropy_rotation + 90) % 360 - 180,  # the grain lies across the wide way
+            "direction": self._grain(),
         }
         known = {"base_color": "specular"}
         told = ("metallic", "anisotropy", "specular", "specular_color", "edge_tint")
         return self._made("ward", values, known, *told)
 
-    def _made(self, model: str, values: dict[str, Value], known: dict[str, str], *told: str) -> Material:
-        """`known`: our parameter for a picture of a field; `told`: fields whose loss was said or is none."""
+    def _satin(self) -> Material:
+        s = self.surface
+        wide, narrow = (max(alpha, 4.5e-3) for alpha in s.alphas)
+        if s.specular < 1:
+            self._tell("its weakened reflection keeps its full strength at the rim")
+        red, green, blue = (min(s.f0 * s.specular * c, 1.0) for c in s.specular_color)
+        values: dict[str, Value] = {
+            "diffuse": s.base_color,
+            "specular": (red, green, blue),
+            "sharpness_along": min(max(2 / narrow**2 - 2, 1.0), 1e5),
+            "sharpness_across": min(max(2 / wide**2 - 2, 1.0), 1e5),
+            "direction": self._grain(),
+        }
+        known = {"base_color": "diffuse", "specular_color": "specular"}
+        return self._made("ashikhmin-shirley", values, known, "anisotropy", "metallic", "specular_color")
+
+    def _grain(self) -> float:
+        """Of the grain, which lies across the wide direction."""
+        return (self.surface.anisotropy_rotation + 90) % 360 - 180
+
+    def _made(
+        self,
+        model: str,
+        values: dict[str, Value],
+        known: dict[str, str],
+        *told: str,
+        rough: str = "roughness",
+    ) -> Material:
+        """`known`: our parameter for a picture of a field; `told`: fields whose loss was said or is none.
+
+        `rough`: the field that became the model's roughness; a picture of it counts as its mean.
+        """
         s = self.surface
         for name, word in (
             ("sheen_color", "sheen is"),
@@ -212,7 +271,7 @@ class _Choice:
                 values[NORMAL] = s.normal_strength
             elif name in known:
                 self._lay(known[name], name, texture, values, textures, model)
-            elif name == "roughness" and model in ("plastic", "ward", "ggx-conductor", "ggx-dielectric"):
+            elif name == rough and "roughness" in values:
                 values["roughness"] = times(values["roughness"], texture)
                 self._mean(name)
             elif name not in told:

@@ -41,6 +41,7 @@ from studio_core.scene.nodes import Material
 from studio_core.shading.materials import Resolved, coefficients, first_channel, resolve
 
 _NARROWER = ("ward", "ashikhmin-shirley")
+SAME = 5e-4  # of the metric: nobody sees it
 NO_MATTE = 0.02  # albedo under which a material with a highlight counts as metal
 HIGHEST_F0 = 0.08
 GLOSSY_GROUND = 1
@@ -60,6 +61,8 @@ class Outgoing:
         if self.samples is None:
             return self.notes
         metric = distance(written, self.samples).metric
+        if metric < SAME:
+            return self.notes
         nearest = f"{written.name}: {name} has no {self.label}; its nearest was written, {metric:.1%} off."
         return (*self.notes, nearest)
 

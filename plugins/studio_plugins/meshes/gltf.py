@@ -15,6 +15,7 @@ import numpy.typing as npt
 
 from studio_core.contract import ImportedModel
 from studio_core.errors import InputError
+from studio_core.exchange.pictures import Pictures
 from studio_core.scene.geometry import Geometry
 from studio_core.scene.nodes import Group, MeshObject, Node, NodeId, new_id
 from studio_core.scene.transform import Transform, normalized, quaternion, rotation_matrix, vec3
@@ -28,7 +29,6 @@ from studio_plugins.meshes.common import (
 )
 from studio_plugins.meshes.gltf_file import GltfFile, Json, as_index
 from studio_plugins.meshes.gltf_materials import GltfMaterials
-from studio_plugins.meshes.pictures import Pictures
 
 Matrix = npt.NDArray[np.float64]
 DEEPEST = 200
@@ -48,7 +48,7 @@ class GltfImporter:
         """Metres from file units by `unit`; raises InputError in one sentence naming file and cause."""
         notes = Notes()
         file = GltfFile(path, read_bytes(path))
-        with Pictures(path, notes) as pictures:
+        with Pictures(path, notes.say) as pictures:
             found = GltfMaterials(file, pictures, notes)
             if not file.list_of("meshes") and file.list_of("materials"):
                 return ImportedModel((), found.every(), notes.told())

@@ -19,8 +19,8 @@ import numpy as np
 import numpy.typing as npt
 
 from studio_core.errors import InputError
+from studio_core.exchange.pictures import beside
 from studio_plugins.meshes.common import MOST_BYTES, refuse
-from studio_plugins.meshes.pictures import beside
 
 Json = dict[str, Any]
 MOST_VALUES = 1 << 28

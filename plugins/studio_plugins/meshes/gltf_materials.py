@@ -15,13 +15,13 @@ import numpy as np
 from studio_core.arrays import frozen_map
 from studio_core.errors import InputError
 from studio_core.exchange.incoming import material_of
+from studio_core.exchange.pictures import Pictures, channel_of, mean_of, opaque
 from studio_core.exchange.surface import Surface, times
 from studio_core.params import Colour
 from studio_core.scene.geometry import Image, Texture
 from studio_core.scene.nodes import Material, new_id
 from studio_plugins.meshes.common import PLAIN_GREY, Notes, colour
 from studio_plugins.meshes.gltf_file import GltfFile, Json, as_index
-from studio_plugins.meshes.pictures import Pictures, channel_of, mean_of, opaque
 
 _READ = (
     "KHR_materials_anisotropy",

@@ -11,11 +11,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from studio_core.exchange.pictures import Pictures, channel_of, mean_of, opaque
 from studio_core.params import Value
 from studio_core.scene.geometry import Texture
 from studio_core.scene.nodes import Material, new_id
 from studio_plugins.meshes.common import PLAIN_GREY, Notes, colour, share
-from studio_plugins.meshes.pictures import Pictures, channel_of, mean_of, opaque
 
 _UNUSED = {
     "map_bump": "bump",

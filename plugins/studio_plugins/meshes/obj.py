@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from studio_core.contract import ImportedModel
+from studio_core.exchange.pictures import Pictures, beside
 from studio_core.scene.nodes import Material, new_id
 from studio_plugins.meshes.common import (
     MOST_FACES,
@@ -27,7 +28,6 @@ from studio_plugins.meshes.common import (
     within_reach,
 )
 from studio_plugins.meshes.mtl import Entry, material_of, parse_mtl
-from studio_plugins.meshes.pictures import Pictures, beside
 from studio_plugins.meshes.polygons import triangulate
 
 Ints = npt.NDArray[np.int64]
@@ -75,7 +75,7 @@ class ObjImporter:
         said = parse_obj(_text(read_bytes(path)), notes)
         if len(said.polygons) > 4 * MOST_FACES:
             raise refuse(path, f"more than {MOST_FACES // 10**6} million faces are not accepted")
-        with Pictures(path, notes) as pictures:
+        with Pictures(path, notes.say) as pictures:
             materials = _materials(path, said, pictures, notes)
         return model_of(path, _parts(said, materials, unit, notes), materials, notes)
 

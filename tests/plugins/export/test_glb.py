@@ -349,7 +349,7 @@ def test_sheen_is_written_for_cloth(host: PluginHost, parts: Any, tmp_path: Path
     assert any("sheen roughness" in note for note in writer.notes)
 
 
-@settings(max_examples=6, suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
+@settings(max_examples=4, suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
 @given(seed=st.integers(0, 1000), gloss=st.floats(0.1, 1), roughness=st.floats(0, 1))
 def test_pictures_come_back_within_eight_bits(
     host: PluginHost, parts: Any, tmp_path: Path, seed: int, gloss: float, roughness: float

@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from studio_core.exchange.pictures import beside
 from studio_plugins.meshes.common import Notes, clean_mesh, colour, share, unique_rows
-from studio_plugins.meshes.pictures import beside
 
 SQUARE = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
 

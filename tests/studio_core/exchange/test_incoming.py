@@ -50,6 +50,9 @@ def test_metallic_roughness_is_ggx_without_a_word() -> None:
         ({"clearcoat": 0.2}, "ggx", "clear coat is left out"),
         ({"clearcoat": 1.0, "metallic": 1.0}, "ggx", "clear coat is left out"),
         ({"specular": 0.6}, "plastic", ""),
+        ({"sheen_color": (0.3, 0.2, 0.1), "specular": 0.0}, "cloth", ""),
+        ({"sheen_color": (0.3, 0.2, 0.1), "roughness": 0.8}, "cloth", "matte"),
+        ({"sheen_color": (0.3, 0.2, 0.1), "roughness": 0.2}, "ggx", "sheen is left out"),
         ({"specular": 0.6, "metallic": 0.6}, "ggx", "weakened"),
         ({"ior": 2.4}, "plastic", ""),
         ({"ior": 2.4, "metallic": 0.7}, "ggx", "instead of 17%"),
@@ -58,7 +61,8 @@ def test_metallic_roughness_is_ggx_without_a_word() -> None:
         ({"metallic": 1.0, "edge_tint": (0.5, 0.6, 0.7)}, "ggx-conductor", ""),
         ({"metallic": 0.6, "edge_tint": (0.5, 0.6, 0.7)}, "ggx", "rim's tint is left out"),
         ({"metallic": 1.0, "anisotropy": 0.6}, "ward", "no brighter rim"),
-        ({"anisotropy": 0.6}, "ggx", "grain is left out"),
+        ({"anisotropy": 0.3}, "ggx", "grain is left out"),
+        ({"anisotropy": 0.6, "roughness": 0.3}, "ashikhmin-shirley", ""),
     ],
 )
 def test_the_nearest_model(changes: dict[str, Any], model: str, word: str) -> None:

@@ -13,7 +13,6 @@ import numpy as np
 from studio_core.errors import InputError
 from studio_core.imaging.io import ImageDecoder
 from studio_core.scene.geometry import Image
-from studio_plugins.meshes.common import Notes
 
 LEAST_SPREAD = 0.01  # of a channel that is more than noise about its mean
 
@@ -21,9 +20,9 @@ LEAST_SPREAD = 0.01  # of a channel that is more than noise about its mean
 class Pictures:
     """Pictures that a model names, each read once; what cannot be read becomes a note."""
 
-    def __init__(self, path: Path, notes: Notes) -> None:
+    def __init__(self, path: Path, say: Callable[[str], object]) -> None:
         self.folder = path.parent
-        self.notes = notes
+        self._say = say
         self._decoder: ImageDecoder | None = None
         self._found: dict[object, Image | None] = {}
 
@@ -38,7 +37,7 @@ class Pictures:
         """The picture of that name near the model; `plain`: of numbers that are no colours."""
         found = beside(self.folder, name)
         if found is None:
-            self.notes.say(f"The picture {name!r} is missing; its surface has a plain colour.")
+            self._say(f"The picture {name!r} is missing; its surface has a plain colour.")
             return None
         return self._once((found, plain), lambda decoder: decoder.read(found, plain=plain))
 
@@ -54,7 +53,7 @@ class Pictures:
                 self._found[key] = read(self._decoder)
             except InputError as error:
                 self._found[key] = None
-                self.notes.say(f"{error}.")
+                self._say(f"{error}.")
         return self._found[key]
 
 
