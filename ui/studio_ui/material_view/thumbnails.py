@@ -16,6 +16,7 @@ from studio_ui.material_view.ball_view import as_image
 from studio_ui.material_view.work import Linear, PreviewWork, light_of
 
 _KEPT = 512
+_WHITES = -0.8  # EV at which white surfaces differ in the neutral room
 Ball = tuple[Linear, bool]
 
 
@@ -62,7 +63,7 @@ class MaterialThumbnails:
         if ball is None:
             return None
         linear, neutral = ball
-        exposure = 0.0 if neutral else session.exposure
+        exposure = _WHITES if self._neutral else 0.0 if neutral else session.exposure
         gain = (1.0, 1.0, 1.0) if neutral or environment is None else environment.gain()
         shown = (key, exposure, gain, session.tonemap)
         if old is None or old[0] != shown:
