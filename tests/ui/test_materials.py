@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from captured_fits import made_up
 from hypothesis import assume, given
 from hypothesis import strategies as st
 from oracles.raycast import nearest
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtGui import QDragEnterEvent, QDragMoveEvent
 from PySide6.QtWidgets import QApplication, QLineEdit, QToolButton
-from ui_support import Driver, room
+from ui_support import Driver, Make, room
 
 from studio_core.edits import Add, AddMaterial, Assign, SetMaterial, SetTexture
 from studio_core.imaging.encode import write_png
@@ -21,6 +23,10 @@ from studio_core.scene.geometry import Geometry, Image, Table, Texture
 from studio_core.scene.nodes import Material, MeshObject
 from studio_core.scene.transform import Transform, looking
 from studio_core.session import View
+from studio_plugins.brdfs import plugin as brdfs
+from studio_plugins.meshes import plugin as meshes
+from studio_plugins.residual import plugin as residual
+from studio_plugins.residual.material import scene_material
 from studio_ui.canvas.projection import eye_of, ray
 from studio_ui.objects.material_drag import MIME, dragged_material, drop_material, slot_at
 from studio_ui.panels.materials import MaterialsPanel
@@ -314,3 +320,29 @@ def test_a_pattern_has_a_size_in_metres_and_is_turned(driver: Driver) -> None:
     assert driver.labels()[-3:] == ["Pattern of Board"] * 3
     driver.document.apply(Add((MeshObject(**{**fields, "id": "two", "transform": Transform(scale=1.5)}),)))
     driver.until(lambda: "Objects differ" in row.told.text())
+
+
+def test_maps_of_a_captured_material_are_one_row(make: Make) -> None:
+    driver = make(plugins=(brdfs, meshes, residual))
+    driver.show(room())
+    made = replace(scene_material(made_up()).material, id="cloth", name="Cloth")
+    flat = Geometry(
+        np.array([[0, 0, 0], [2, 0, 0], [2, 0, -2], [0, 0, -2]], np.float32),
+        np.array([[0, 1, 2], [0, 2, 3]], np.uint32),
+        uvs=np.array([[0, 0], [1, 0], [1, 1], [0, 1]], np.float32),
+    )
+    driver.document.apply(AddMaterial(made))
+    driver.document.apply(Add((MeshObject(id="sheet", name="Sheet", geometry=flat, materials=("cloth",)),)))
+    panel = choose(driver, "cloth")
+    form = panel.editor
+    assert form.textures == {}
+    assert form.maps.text.text() == "9 × 9, 4 maps"
+    driver.until(lambda: form.maps.pattern.width_field.isEnabled())
+    form.maps.pattern.width_field.setValue(0.5)
+    driver.until(lambda: form.maps.pattern.width_field.value() == pytest.approx(0.5))
+    (scale,) = {texture.scale for texture in driver.document.scene.material("cloth").textures.values()}
+    assert scale == pytest.approx((4.0, 4.0)), "all four lie alike"
+    assert driver.labels()[-1] == "Pattern of Cloth"
+    driver.document.apply(AddMaterial(Material(id="plain", name="Plain", model="captured")))
+    choose(driver, "plain")
+    assert form.maps.text.text() == "No pictures: every spot is alike"

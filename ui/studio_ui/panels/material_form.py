@@ -26,6 +26,7 @@ from studio_ui.forms.param_form import ParamForm, form_label, form_layout
 from studio_ui.forms.sinks import EditSink
 from studio_ui.forms.spin import MIXED
 from studio_ui.look.theme import GAP
+from studio_ui.panels.maps_row import MapsRow
 from studio_ui.panels.measurement_row import MeasurementRow, measurement_of
 from studio_ui.panels.panel import clear, note
 from studio_ui.panels.texture_row import TextureRow
@@ -48,6 +49,7 @@ class MaterialForm(QWidget):
         self.kind = Combo()
         self.kinds: list[str] = []
         self.textures: dict[str, TextureRow] = {}
+        self.maps: MapsRow | None = None
         self.measurement: MeasurementRow | None = None
         self._fitted: Mapping[str, Value] | None = None
         self._context, self._tool = context, tool
@@ -83,7 +85,10 @@ class MaterialForm(QWidget):
             every = [{**usual, **material.values} for material in materials]
             mixed = {n for n in usual if any(one[n] != every[-1][n] for one in every)}
             self.form.show_values(every[-1], mixed)
-        lengths = self._ruler.lengths(scene, last.id) if last.textures and self.textures else None
+        laid = last.textures and (self.textures or self.maps is not None)
+        lengths = self._ruler.lengths(scene, last.id) if laid else None
+        if self.maps is not None:
+            self.maps.show_maps(last.textures, lengths)
         for name, shown in self.textures.items():
             shown.show_texture(last.textures.get(name), lengths)
         if self.measurement is not None and last.values != self._fitted:
@@ -125,7 +130,7 @@ class MaterialForm(QWidget):
         clear(self._column)
         self.form = self.common = None
         self.textures = {}
-        self.measurement = None
+        self.maps = self.measurement = None
         if not materials:
             self._column.addWidget(note("The scene has no materials yet."))
             return
@@ -146,7 +151,11 @@ class MaterialForm(QWidget):
             for name, field in self.form.fields.items():
                 if isinstance(field, ColourField) and field.menu is not None:
                     field.menu.metal = partial(self._put_metal, name)
-            for name in (*model.textures, *shape_textures(model)) if len(materials) == 1 else ():
+            names = (*model.textures, *shape_textures(model)) if len(materials) == 1 else ()
+            if any(name not in infos for name in names):  # made together, of no number that can be typed
+                self._column.addWidget(self._pattern(materials[0].id, names, model.label))
+                names = ()
+            for name in names:
                 self._column.addWidget(self._texture(materials[0].id, name, infos[name].label))
         elif not self._context.warm:
             self._column.addWidget(note("Loading…"))
@@ -184,6 +193,14 @@ class MaterialForm(QWidget):
         )
         self.textures[name] = made
         layout.addRow(form_label(f"{label} map", "A picture that the value is multiplied with"), made)
+        return box
+
+    def _pattern(self, material: MaterialId, names: tuple[str, ...], kind: str) -> QWidget:
+        box = QWidget()
+        layout = form_layout(box)
+        self.maps = MapsRow(names, self._tool, lambda name, texture: self._lay(material, name, texture))
+        told = "What each spot has of its own, as it was photographed"
+        layout.addRow(form_label(f"{kind} pattern", told), self.maps)
         return box
 
     def _measurement(self, table: Table, model: Brdf | None) -> QWidget:
