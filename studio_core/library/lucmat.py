@@ -50,7 +50,10 @@ def read(path: Path) -> Kept:
     """The material of a file. ProjectError names the file where it is damaged or holds something else."""
     from studio_core.project.store import load
 
-    found = load(path)
+    try:
+        found = load(path)
+    except ProjectError as error:
+        raise ProjectError(str(error).replace("a Lucarne project", "a Lucarne material")) from error
     materials = tuple(found.scene.materials.values())
     if len(materials) != 1 or found.scene.nodes:
         raise ProjectError(f"{path.name} holds no single material: it is a project, open it as one.")

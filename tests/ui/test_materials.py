@@ -28,6 +28,7 @@ from studio_plugins.meshes import plugin as meshes
 from studio_plugins.residual import plugin as residual
 from studio_plugins.residual.material import scene_material
 from studio_ui.canvas.projection import eye_of, ray
+from studio_ui.look.theme import PANEL_WIDTH
 from studio_ui.objects.material_drag import MIME, dragged_material, drop_material, slot_at
 from studio_ui.panels.materials import MaterialsPanel
 from studio_ui.panels.texture_row import small_pixmap
@@ -336,6 +337,7 @@ def test_maps_of_a_captured_material_are_one_row(make: Make) -> None:
     panel = choose(driver, "cloth")
     form = panel.editor
     assert form.textures == {}
+    assert form.minimumSizeHint().width() <= PANEL_WIDTH - 40, "a narrow panel shows all of it"
     assert form.maps.text.text() == "9 × 9, 4 maps"
     driver.until(lambda: form.maps.pattern.width_field.isEnabled())
     form.maps.pattern.width_field.setValue(0.5)

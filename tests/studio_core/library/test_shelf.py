@@ -82,7 +82,7 @@ def test_a_damaged_file_is_listed_with_its_reason(shelf: Shelf) -> None:
     (shelf.folder / "Bad.lucmat").write_bytes(b"no material")
     bad = next(entry for entry in shelf.entries() if entry.kept is None)
     assert bad.name == "Bad"
-    assert "Bad.lucmat" in bad.problem
+    assert bad.problem == "Bad.lucmat is not a Lucarne material"
     assert names(shelf, "good") == ["Good"]
     shelf.remove(bad)
     assert names(shelf) == ["Brass", "Wall paint", "Good"]

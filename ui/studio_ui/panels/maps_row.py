@@ -14,7 +14,10 @@ from studio_ui.panels.texture_row import small_pixmap
 
 
 class MapsRow(QWidget):
-    """`lay(name, texture)` is an edit of all maps that lie as this one does; `names` is their order."""
+    """`lay(name, texture)` is an edit of all maps that lie as this one does; `names` is their order.
+
+    `pattern` is for whoever makes the row to put below.
+    """
 
     def __init__(
         self,
@@ -35,7 +38,6 @@ class MapsRow(QWidget):
         column.setContentsMargins(0, 0, 0, 0)
         column.setSpacing(2)
         column.addLayout(row(self.picture, self.text, stretch=1))
-        column.addWidget(self.pattern)
 
     def show_maps(self, textures: Mapping[str, Texture], lengths: UnitLengths | None) -> None:
         """What lies there now, on surfaces with such lengths."""

@@ -193,6 +193,7 @@ class MaterialForm(QWidget):
         )
         self.textures[name] = made
         layout.addRow(form_label(f"{label} map", "A picture that the value is multiplied with"), made)
+        layout.addRow(made.pattern)
         return box
 
     def _pattern(self, material: MaterialId, names: tuple[str, ...], kind: str) -> QWidget:
@@ -201,6 +202,7 @@ class MaterialForm(QWidget):
         self.maps = MapsRow(names, self._tool, lambda name, texture: self._lay(material, name, texture))
         told = "What each spot has of its own, as it was photographed"
         layout.addRow(form_label(f"{kind} pattern", told), self.maps)
+        layout.addRow(self.maps.pattern)
         return box
 
     def _measurement(self, table: Table, model: Brdf | None) -> QWidget:

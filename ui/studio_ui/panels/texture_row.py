@@ -20,7 +20,8 @@ _ICON = QSize(40, 26)
 class TextureRow(QWidget):
     """`ask()` wants another picture, `put(texture)` is an edit; None takes the picture away.
 
-    `lay(texture)` is one too, of all pictures that lie as this one does.
+    `lay(texture)` is one too, of all pictures that lie as this one does. `pattern` says how it lies; whoever
+    makes the row puts it below, where it has all of the width.
     """
 
     def __init__(
@@ -45,7 +46,6 @@ class TextureRow(QWidget):
         column.setContentsMargins(0, 0, 0, 0)
         column.setSpacing(2)
         column.addLayout(row(self.picture, self.text, load, self.remove, stretch=1))
-        column.addWidget(self.pattern)
 
     def show_texture(self, texture: Texture | None, lengths: UnitLengths | None) -> None:
         """What lies there now, on surfaces with such lengths."""
