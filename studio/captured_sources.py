@@ -1,4 +1,4 @@
-"""What `lucarne fit-material` starts from: a folder of photographs of a ball or of a flat sample."""
+"""What `lucarne fit-material` starts from: photographs of a ball or of a flat sample, or a BTF."""
 
 from __future__ import annotations
 
@@ -12,7 +12,22 @@ from studio_core.errors import InputError
 if TYPE_CHECKING:
     from studio.headless import Headless
     from studio_plugins.residual.pictures import Pictures
+    from studio_plugins.residual.result import ResidualFit, Settings
     from studio_plugins.residual.samples import Ball, Flags, Samples
+
+
+_OF_PHOTOGRAPHS = (
+    "lights",
+    "mirror_ball",
+    "ball",
+    "flat",
+    "mask",
+    "white",
+    "white_at",
+    "distance",
+    "no_refine",
+)
+"""Options that a BTF has no use for."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,6 +60,55 @@ def add_options(verb: argparse.ArgumentParser) -> None:
 def read_source(options: argparse.Namespace, program: Headless) -> Source:
     """What the options name, as samples. InputError in one sentence."""
     return _photographs(options, program)
+
+
+def is_btf(options: argparse.Namespace) -> bool:
+    """Whether the source is a bidirectional texture function."""
+    from studio_plugins.residual import btf
+
+    return btf.is_btf(options.source)
+
+
+def fit_btf_source(
+    options: argparse.Namespace, settings: Settings, program: Headless
+) -> tuple[ResidualFit, dict[str, Any]]:
+    """The fit of a BTF, and the values of its report."""
+    from studio_plugins.residual.btf import open_btf, unique_directions
+    from studio_plugins.residual.btf_fit import fit_btf, lights_held
+
+    given = [f"--{name.replace('_', '-')}" for name in _OF_PHOTOGRAPHS if getattr(options, name)]
+    if given:
+        raise InputError(f"{given[0]} is of photographs, and {options.source} is a BTF")
+    btf = open_btf(options.source, options.response)
+    held = None
+    if options.holdout is not None:
+        try:
+            held = lights_held(btf, float(options.holdout))
+        except ValueError:
+            raise InputError(f"--holdout {options.holdout}: of a BTF it is a share of the lights") from None
+    workers = program.services.workers
+    with program.job("Fitting") as job:
+        made, errors = fit_btf(btf, settings, held, job, size=options.size, workers=workers)
+    for note in made.notes:
+        program.say(note)
+    found = {
+        "pictures": len(btf.lights),
+        "lights": len(unique_directions(btf.lights)[0]),
+        "views": len(unique_directions(btf.views)[0]),
+        "texels": list(btf.size[::-1]),
+    }
+    values: dict[str, Any] = {"source": str(options.source), "btf": found, "fit": made.report()}
+    if errors is not None:
+        values["holdout"] = {
+            "pictures": errors.pictures,
+            "as_given": {
+                "holdout_nmse": errors.made.whole,
+                "holdout_nmse_outside": errors.made.outside,
+                "parametric_nmse": errors.alone.whole,
+                "parametric_nmse_outside": errors.alone.outside,
+            },
+        }
+    return made, values
 
 
 def _photographs(options: argparse.Namespace, program: Headless) -> Source:

@@ -14,13 +14,13 @@ from studio_core.errors import InputError
 if TYPE_CHECKING:
     from studio.headless import Headless
     from studio_plugins.residual.material import SceneMaterial
-    from studio_plugins.residual.result import ResidualFit
+    from studio_plugins.residual.result import ResidualFit, Settings
     from studio_plugins.residual.samples import Flags, Lights, Samples
 
 
 def add_options(verb: argparse.ArgumentParser) -> None:
     """The options of `fit-material`."""
-    verb.add_argument("source", type=Path, metavar="FOLDER", help="photographs, one lamp each")
+    verb.add_argument("source", type=Path, metavar="SOURCE", help="photographs, one lamp each, or a BTF")
     captured_sources.add_options(verb)
     verb.add_argument("--holdout", metavar="FRACTION|NAME,…", help="lights kept back, to be asked about")
     verb.add_argument("--basis", default="", metavar="NAME", help="of each spot's own part")
@@ -36,7 +36,6 @@ def fit_material(options: argparse.Namespace, program: Headless) -> None:
     """`lucarne fit-material`."""
     from studio.verbs import check_target, result
     from studio_core.library.lucmat import SUFFIX
-    from studio_plugins.residual.fit import fit
     from studio_plugins.residual.material import SHOWN, scene_material
     from studio_plugins.residual.result import Settings
 
@@ -47,19 +46,13 @@ def fit_material(options: argparse.Namespace, program: Headless) -> None:
         if path is not None:
             check_target(path, suffixes, what)
     for_scene = options.out is not None and options.out.suffix.lower() == SUFFIX
-    source = captured_sources.read_source(options, program)
-    samples = source.samples
-    held = _held(options.holdout, samples.lights)
     settings = Settings(basis=options.basis, refine=0 if options.no_refine else Settings().refine)
     if for_scene:
         settings = replace(settings, among=SHOWN)
-    with program.job("Fitting") as job:
-        made = fit(samples.some(~held), settings, job)
-    for note in (*source.notes, *made.notes):
-        program.say(note)
-    values: dict[str, Any] = {"source": str(options.source), **source.found, "fit": made.report()}
-    if held.any():
-        values["holdout"] = _errors(made, samples.some(held), bool(settings.refine))
+    if captured_sources.is_btf(options):
+        made, values = captured_sources.fit_btf_source(options, settings, program)
+    else:
+        made, values = _fit_photographs(options, settings, program)
     if for_scene:
         found = scene_material(made, options.source.stem)
         for note in found.notes:
@@ -71,6 +64,24 @@ def fit_material(options: argparse.Namespace, program: Headless) -> None:
     if options.report is not None:
         options.report.write_text(json.dumps(values, indent=1, allow_nan=False), "utf-8")
     result(options, program, values, _text(values))
+
+
+def _fit_photographs(
+    options: argparse.Namespace, settings: Settings, program: Headless
+) -> tuple[ResidualFit, dict[str, Any]]:
+    from studio_plugins.residual.fit import fit
+
+    source = captured_sources.read_source(options, program)
+    samples = source.samples
+    held = _held(options.holdout, samples.lights)
+    with program.job("Fitting") as job:
+        made = fit(samples.some(~held), settings, job)
+    for note in (*source.notes, *made.notes):
+        program.say(note)
+    values: dict[str, Any] = {"source": str(options.source), **source.found, "fit": made.report()}
+    if held.any():
+        values["holdout"] = _errors(made, samples.some(held), bool(settings.refine))
+    return made, values
 
 
 def _write_material(path: Path, found: SceneMaterial, made: ResidualFit) -> None:

@@ -9,12 +9,15 @@ import numpy as np
 import pytest
 
 from studio.bench.lab import Rig, row, shoot
+from studio.bench.lab_btf import ClothBtf, Weave
+from studio.bench.lab_btf_files import write_pictures
 from studio.bench.lab_files import write_shots
 from studio.bench.lab_surfaces import library
 from studio.cli import main
 from studio_core.imaging.encode import write_exr
 from studio_core.imaging.io import read_image
 from studio_core.library.lucmat import read
+from studio_plugins.residual.btf import directions
 from studio_plugins.residual.samples import Ball
 
 RIG = Rig(size=(84, 80), ball=Ball(42.3, 40.2, 36.0))
@@ -125,3 +128,20 @@ def test_lamps_on_a_mirror_ball_and_a_ball_told(tmp_path: Path) -> None:
     assert told["light_source"] == "mirror ball"
     found = np.array([one["direction"] for one in told["lights"]])
     assert np.degrees(np.arccos((found * shots.told.directions).sum(axis=1))).max() < 3.5  # a small ball
+
+
+def test_a_btf_in_a_zip_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    rings = [(0.0, 1), (30.0, 5), (60.0, 6)]
+    some = np.concatenate([directions(np.radians(t), 2 * np.pi * np.arange(n) / n) for t, n in rings])
+    path, report = tmp_path / "cloth.zip", tmp_path / "r.json"
+    write_pictures(ClothBtf(Weave(texels=16, yarns=2, height=0.02), some, full=1.0), path, "png")
+    given = ["--basis", "albedo-light", "--report", str(report), "-o", str(tmp_path / "m.exr")]
+    assert main(["fit-material", str(path), "--holdout", "0.25", *given]) == 0
+    told = json.loads(report.read_text())
+    assert told["btf"] == {"pictures": 144, "lights": 12, "views": 12, "texels": [16, 16]}
+    errors = told["holdout"]["as_given"]
+    assert errors["holdout_nmse"] < 0.3 * errors["parametric_nmse"]
+    assert "albedo-light, 24 bytes a texel" in capsys.readouterr().out
+    for wrong, why in ((["--flat"], "--flat is of photographs"), (["--holdout", "one-row"], "a share")):
+        assert main(["fit-material", str(path), *wrong]) == 2
+        assert why in capsys.readouterr().err

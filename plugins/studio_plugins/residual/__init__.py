@@ -8,6 +8,8 @@ window.
   (what a set of file names tells), `folder` (what belongs together)
 - from pictures: `brackets` (exposures become light), `pictures` (a folder's light), `ball` (where the sphere
   is, to a fraction of a pixel), `reflectance_map`, `flat`
+- BTFs: `btf` (what one is), `btf_pictures` (folders, zip files), `btf_factored` (`.btf` files), `btf_solve`
+  (least squares that grow with the pictures), `btf_fit`
 - the fit: `parametric` (f_r), `bases` (δ*), `tables` (what all texels share), `masks`, `solve` (rank-aware,
   robust), `refine` (light directions and strengths), `fit` puts them in order and chooses
 - what came of it: `result`, `errors`, `splits`, `frames` (tangent space)

@@ -82,7 +82,7 @@ class Developer:
 
     def _alone(self, shot: Photograph) -> Light:
         """A lamp's only picture: as it is, unless exposures differ from lamp to lamp."""
-        light, full = _linear(shot, self._kind)
+        light, full = linear(shot, self._kind)
         ev = shot.facts.ev
         if ev is not None:
             if self._origin is None:
@@ -196,7 +196,11 @@ def _full(response: Response) -> float:
     return float(2.0 ** -np.mean(end))
 
 
-def _linear(shot: Photograph, response: str) -> tuple[F32, Flags]:
+def linear(shot: Photograph, response: str = AUTOMATIC, grow: bool = True) -> tuple[F32, Flags]:
+    """Light (H, W, 3) of a photograph alone, and where it is clipped (H, W).
+
+    `grow`: in 8 bits neighbours of what is clipped count as clipped, for compression mixes them.
+    """
     pixels = shot.pixels
     if pixels.dtype == np.float32:
         # a value that many pixels share exactly at the top is where the sensor ended
@@ -204,10 +208,9 @@ def _linear(shot: Photograph, response: str) -> tuple[F32, Flags]:
         return in_rec709(pixels, shot.colour), full & (np.count_nonzero(full) > 8)
     top = float(np.iinfo(pixels.dtype).max)
     full = np.asarray((pixels >= _CLIPPED * top).any(axis=-1), np.bool_)
-    if pixels.dtype == np.uint8 and full.any():
+    if grow and pixels.dtype == np.uint8 and full.any():
         import cv2
 
-        # compression mixes neighbours with what is clipped
         full = cv2.dilate(full.astype(np.uint8), np.ones((5, 5), np.uint8)) > 0
     scaled = pixels.astype(np.float32) / np.float32(top)
     if response == LINEAR:
