@@ -25,7 +25,6 @@ from studio_core.kernels.compose import (
     add_caught,
     add_light,
     add_samples,
-    face_texels,
     hit_coefficients,
     outline_pixels,
     shade_hits,
@@ -34,7 +33,7 @@ from studio_core.kernels.facing import shown_sides
 from studio_core.kernels.tonemap import prepare
 from studio_core.parallel import Workers
 from studio_core.scene.diff import Aspect
-from studio_core.scene.nodes import Light, Scene
+from studio_core.scene.nodes import Scene
 from studio_core.session import View
 from studio_core.shading.artifacts import (
     Hits,
@@ -45,6 +44,7 @@ from studio_core.shading.artifacts import (
 )
 from studio_core.shading.backdrop import NOTHING, BackdropPainter, Behind
 from studio_core.shading.coefficients import Coefficients, CoefficientTable, Maps
+from studio_core.shading.embossing import FACES, VERTICES, Embosser, Relief, embossed, lit, texels_of_faces
 from studio_core.shading.frame import Frame
 from studio_core.shading.job import Job
 from studio_core.shading.kept import Kept
@@ -58,9 +58,6 @@ F32 = npt.NDArray[np.float32]
 I32 = npt.NDArray[np.int32]
 I64 = npt.NDArray[np.int64]
 U32 = npt.NDArray[np.uint32]
-
-FACES = 1 << 13
-VERTICES = 1 << 13
 
 
 class PictureStage:
@@ -123,6 +120,7 @@ class Compositor:
         self._workers = workers
         self._sides: Kept[tuple[U32, F32]] = Kept()
         self._density: Kept[F32] = Kept()
+        self._embosser = Embosser(workers)
         self._parts: Kept[tuple[Part, ...]] = Kept()
         self._outline: Kept[_Outline] = Kept()
         self._behind: Kept[list[Behind]] = Kept()
@@ -147,13 +145,15 @@ class Compositor:
             )
         faces = self._faces(surfaces, view, table.maps)
         tables = self._tables(scene, radiance, table, view, job)
-        out = self._pixels(parts[0], behind[0], faces, tables, job)
+        relief = self._embosser(scene, radiance, table, job)
+        out = self._pixels(parts[0], behind[0], faces, tables, relief, job)
         for part, beyond in zip(parts[1:], behind[1:], strict=True):
             finer = tables._replace(pixel_angle=_pixel_angle(part.layers[0].hits.view))
-            out[part.pixels] = self._pixels(part, beyond, faces, finer, job)
+            out[part.pixels] = self._pixels(part, beyond, faces, finer, relief, job)
         linear = out.reshape(view.height, view.width, 3)
         corners = self._corners(lambda: visible_vertices(surfaces, hits), hits, mesh)
-        colours = VertexColours(tables.record, tables.sums, corners, table.maps, backdrop)
+        maps = (table.maps, backdrop, *((None, None) if relief is None else (relief.bend, table.reliefs)))
+        colours = VertexColours(tables.record, tables.sums, corners, *maps)
         return Picture(radiance, linear, outline.coverage, outline.node, outline.distance, colours)
 
     def radiance(
@@ -171,7 +171,7 @@ class Compositor:
         """
         faces = self._faces(radiance.surfaces, hits.view, table.maps)
         tables = self._tables(scene, radiance, table, hits.view, job)
-        out = self._hits(hits, faces, tables, job)
+        out = self._hits(hits, faces, tables, self._embosser(scene, radiance, table, job), job)
         rows, photograph = self.photograph(scene, radiance.surfaces, hits, samples)
         given = (rows, rows, 1, np.ones(len(rows), np.float32), hits.face, hits.u, hits.v, faces.shown)
         add_caught(0, len(rows), *given, tables.record, photograph, out)
@@ -201,7 +201,15 @@ class Compositor:
         hit_coefficients(*given, out)
         return out.reshape(-1, table.width, 3)
 
-    def _pixels(self, part: Part, behind: Behind, faces: _Faces, tables: _Tables, job: Job | None) -> F32:
+    def _pixels(
+        self,
+        part: Part,
+        behind: Behind,
+        faces: _Faces,
+        tables: _Tables,
+        relief: Relief | None,
+        job: Job | None,
+    ) -> F32:
         """(P, 3) the pixels of a part before what is behind them."""
         layers, hits, background = part.layers, part.layers[0].hits, behind.pixels
         given = (hits.face, hits.u, hits.v, hits.distance, *faces, *tables)
@@ -210,9 +218,10 @@ class Compositor:
         def look(start: int, stop: int, values: F32) -> None:
             shade_hits(start, stop, *given, background if alone else NO_COLOUR, values)
 
-        out = averaged(layers[0], look, NO_COLOUR if alone else background, self._workers, job)
+        seen = embossed(look, relief, _embossing(hits, faces, tables))
+        out = averaged(layers[0], seen, NO_COLOUR if alone else background, self._workers, job)
         for layer in layers[1:]:
-            values = self._hits(layer.hits, faces, tables, job)
+            values = self._hits(layer.hits, faces, tables, relief, job)
             add_samples(layer.samples, hits.samples**2, layer.weight, values, out)
         for layer, photograph in zip(layers, behind.caught, strict=False):
             if len(layer.caught):
@@ -232,15 +241,18 @@ class Compositor:
 
         self._workers.run(len(rows), PIXELS, catch, job)
 
-    def _hits(self, hits: Hits, faces: _Faces, tables: _Tables, job: Job | None) -> F32:
+    def _hits(
+        self, hits: Hits, faces: _Faces, tables: _Tables, relief: Relief | None, job: Job | None
+    ) -> F32:
         out = np.empty((len(hits.face), 3), np.float32)
 
         given = (hits.face, hits.u, hits.v, hits.distance, *faces, *tables)
 
-        def shade(start: int, stop: int) -> None:
-            shade_hits(start, stop, *given, NO_COLOUR, out[start:stop])
+        def shade(start: int, stop: int, values: F32) -> None:
+            shade_hits(start, stop, *given, NO_COLOUR, values)
 
-        self._workers.run(len(out), PIXELS, shade, job)
+        seen = embossed(shade, relief, _embossing(hits, faces, tables))
+        self._workers.run(len(out), PIXELS, lambda start, stop: seen(start, stop, out[start:stop]), job)
         return out
 
     def _faces(self, surfaces: Surfaces, view: View, maps: Maps) -> _Faces:
@@ -258,15 +270,7 @@ class Compositor:
             return shown, height
 
         def density() -> F32:
-            out = np.empty(count, np.float32)
-            layout = (maps.kind, maps.size, maps.uv_map)
-
-            def look(start: int, stop: int) -> None:
-                corners = (mesh.positions, mesh.uvs, mesh.faces, mesh.face_material)
-                face_texels(start, stop, *corners, *layout, out)
-
-            self._workers.run(count, FACES, look)
-            return out
+            return texels_of_faces(mesh, maps.kind, maps.size, maps.uv_map, self._workers)
 
         shown, height = self._sides(sides, mesh, view)
         return _Faces(shown, height, self._density(density, mesh, maps), mesh.face_material)
@@ -279,13 +283,10 @@ class Compositor:
         record = np.zeros((count, RECORD), np.float32)
         record[:, 6:] = mesh.uvs
         sums = np.zeros((count if (maps.kind == GENERAL).any() else 0, table.plain.shape[1]), np.float32)
-        for node, layer in radiance.layers.items():
-            light = scene.nodes.get(node)
-            if not isinstance(light, Light) or not scene.shown(node):
-                continue
+        for gain, layer in lit(scene, radiance):
             terms = np.ascontiguousarray(layer.of_width(table.width).terms, np.float32)
             terms = terms.reshape(count, table.width * 3)
-            of_light = (terms, np.asarray(light.gain(), np.float32), radiance.valid)
+            of_light = (terms, gain, radiance.valid)
             given = (*of_light, mesh.material, maps.kind, table.plain, table.slope, record, sums)
             self._workers.run(count, VERTICES, partial(_add_light, given), job)
         if radiance.surfaces.catches.any():
@@ -312,6 +313,13 @@ class Compositor:
             coverage[hits.edges.pixels] = outline(hits.edges.hits)[0]
         shape = (view.height, view.width)
         return _Outline(coverage.reshape(shape), node.reshape(shape), distance.reshape(shape))
+
+
+def _embossing(hits: Hits, faces: _Faces, tables: _Tables) -> tuple[Any, ...]:
+    """What `add_relief` asks of hits besides normal maps."""
+    places = (hits.face, hits.u, hits.v, hits.distance, faces.shown, faces.height, faces.material)
+    maps = (tables.texels, tables.first, tables.size, tables.levels, tables.uv_map, tables.pixel_angle)
+    return (*places, tables.kind, tables.record, *maps, faces.density)
 
 
 def _add_light(given: tuple[Any, ...], start: int, stop: int) -> None:

@@ -47,7 +47,11 @@ class PaintedStage:
         valid = visible_vertices(surfaces, hits) | self.everywhere
         lights = list(frame.scene.of(Light))[:1]
         irradiance = 4 * terms[:, 0] * valid[:, None]
-        layer = LayerRadiance(terms * valid[:, None, None], irradiance)
+        tilts = None
+        if any("normal" in material.textures for material in frame.scene.materials.values()):
+            lean = np.sin(mesh.positions @ WAVES[:9].T - self.phase).reshape(-1, 3, 1, 3)
+            tilts = (lean * terms[:, None] * valid[:, None, None, None]).astype(np.float32)
+        layer = LayerRadiance(terms * valid[:, None, None], irradiance, tilts)
         return Radiance(surfaces, hits, {light.id: layer for light in lights}, valid, 1024, True)
 
 

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from studio_core.scene.face_tree import FaceTree
     from studio_core.scene.world_mesh import WorldMesh
     from studio_core.shading.coefficients import Maps
+    from studio_core.shading.reliefs import Reliefs
 
 Source: TypeAlias = tuple[NodeId, Geometry, tuple[MaterialId, ...]]
 """An object, its mesh, the material of each slot."""
@@ -105,7 +106,8 @@ class Shapes:
 
     Row m is that of material m as a whole. Where a picture changes the shape over a surface, further rows
     follow, and `row` (V,) names that of each vertex; `owner` (R,) is the material of each row. `tables` are
-    those that shapes name, kept alive.
+    those that shapes name, kept alive. `tilt` (R,) is the slope of normals at which light is looked at for a
+    normal map, 0 for rows without one; None where no material has one.
     """
 
     address: npt.NDArray[np.int64]
@@ -116,6 +118,7 @@ class Shapes:
     tables: tuple[Table, ...] = ()
     owner: npt.NDArray[np.int64] | None = None
     row: npt.NDArray[np.int32] | None = None
+    tilt: F32 | None = None
 
     def rows(self, points: ShadingPoints) -> npt.NDArray[np.int32]:
         """(V,) the row of each of the points that this was made for; -1: no material."""
@@ -215,11 +218,14 @@ class EdgeHits:
 class LayerRadiance:
     """One light's contribution at unit gain: terms (V, T, 3), irradiance (V, 3).
 
-    T is the same for all layers, and at least what the scene's materials have.
+    T is the same for all layers, and at least what the scene's materials have. Where materials have normal
+    maps, tilts (V, 3, T, 3) tell how terms change with the normal: at one of components (x, y, z) in the
+    vertex' frame they are terms + x · tilts[0] + y · tilts[1] + (1 − z) · tilts[2], about.
     """
 
     terms: F32
     irradiance: F32
+    tilts: F32 | None = None
 
     def of_width(self, width: int) -> LayerRadiance:
         """The same with `width` terms: zeros behind its own, or without the last ones."""
@@ -228,7 +234,11 @@ class LayerRadiance:
             return self
         terms = np.zeros((count, width, 3), np.float32)
         terms[:, :own] = self.terms[:, :width]
-        return LayerRadiance(terms, self.irradiance)
+        tilts = None
+        if self.tilts is not None:
+            tilts = np.zeros((count, self.tilts.shape[1], width, 3), np.float32)
+            tilts[:, :, :own] = self.tilts[:, :, :width]
+        return LayerRadiance(terms, self.irradiance, tilts)
 
 
 @dataclass(frozen=True)
@@ -302,6 +312,7 @@ class VertexColours:
     `Radiance.valid`. What catches shadows is black there, and has in record[:, 3:6] what the backdrop without
     gain is multiplied with. `shown` (V,) are the corners of what the picture shows; others may be turned away
     from its eye, and black. `backdrop` is None where none is seen.
+    With normal maps `reliefs` and bend (V, 18) are as in `kernels.relief.add_relief`; else both are None.
     """
 
     record: F32
@@ -309,6 +320,8 @@ class VertexColours:
     shown: npt.NDArray[np.bool_]
     maps: Maps
     backdrop: Backdrop | None
+    bend: F32 | None = None
+    reliefs: Reliefs | None = None
 
 
 @dataclass(frozen=True)

@@ -7,6 +7,7 @@ the geometry stands still, so that light, material and view cost no rays.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 import numpy.typing as npt
@@ -15,6 +16,7 @@ from studio_core.kernels.directions import DirectionList, DirectionSet, directio
 from studio_core.kernels.light_tree import LightTree
 from studio_core.kernels.radiance import BATCH, environment_terms, lamp_terms
 from studio_core.kernels.raycast import RayCaster
+from studio_core.kernels.tilted import FIELDS
 from studio_core.kernels.visibility import occlusion_rays, trace_visibility
 from studio_core.parallel import Workers
 from studio_core.shading.artifacts import (
@@ -26,6 +28,7 @@ from studio_core.shading.artifacts import (
 )
 from studio_core.shading.job import Job
 from studio_core.shading.lamps import lamp_light, lamp_targets
+from studio_core.shading.tilting import Facing, facings, gather_tilts
 
 F32 = npt.NDArray[np.float32]
 U64 = npt.NDArray[np.uint64]
@@ -99,8 +102,9 @@ def _same(a: Directions, b: Directions) -> bool:
 
 def blank_layer(mesh: ShadingPoints, shapes: Shapes) -> LayerRadiance:
     """A layer without light."""
-    count = len(mesh.positions)
-    return LayerRadiance(np.zeros((count, shapes.width, 3), np.float32), np.zeros((count, 3), np.float32))
+    count, width = len(mesh.positions), shapes.width
+    tilts = None if shapes.tilt is None else np.zeros((count, FIELDS, width, 3), np.float32)
+    return LayerRadiance(np.zeros((count, width, 3), np.float32), np.zeros((count, 3), np.float32), tilts)
 
 
 @dataclass(frozen=True)
@@ -167,6 +171,7 @@ def environment_layer(
     if not len(points):
         return layer
     local_eye, rows = (eye - mesh.origin).astype(np.float32), shapes.rows(mesh)
+    ways = facings(mesh, shapes, layer)
     for beam in beams(lighting, level, quarters):
         directions = beam.directions
         step = max(POINTS, BLOCK_BYTES * 8 // max(directions.size, 1))
@@ -177,17 +182,18 @@ def environment_layer(
             def run(
                 start: int,
                 stop: int,
-                block: Points = block,
-                bits: U64 = bits,
-                beam: Beams = beam,
+                block: Points,
+                bits: U64,
+                beam: Beams,
+                facing: Facing,
             ) -> None:
                 environment_terms(
                     start,
                     stop,
                     block,
-                    mesh.positions,
-                    mesh.normals,
-                    mesh.tangents,
+                    facing.mesh.positions,
+                    facing.mesh.normals,
+                    facing.mesh.tangents,
                     rows,
                     local_eye,
                     bits,
@@ -198,11 +204,16 @@ def environment_layer(
                     shapes.terms,
                     shapes.offset,
                     shapes.data,
-                    layer.terms,
-                    layer.irradiance,
+                    facing.terms,
+                    facing.irradiance,
                 )
 
-            workers.run(len(block), POINTS, run, job)
+            for facing in ways:
+                some = facing.some(block)
+                own = partial(run, block=block[some], bits=bits[some], beam=beam, facing=facing)
+                workers.run(len(block[some]), POINTS, own, job)
+    if layer.tilts is not None:
+        gather_tilts(shapes, mesh, ways, layer.tilts)
     return layer
 
 
@@ -216,9 +227,14 @@ def lamp_layer(
     samples: int,
     workers: Workers,
     job: Job,
+    seen_from: ShadingPoints | None = None,
 ) -> LayerRadiance:
-    """One lamp's layer at unit gain for `points`, by traced shadow rays to `samples` places of the lamp."""
+    """One lamp's layer at unit gain for `points`, by traced shadow rays to `samples` places of the lamp.
+
+    Rays leave by the normals of `seen_from`, where that is given, rather than by those of `mesh`.
+    """
     layer = blank_layer(mesh, shapes)
+    ways, level = facings(mesh, shapes, layer), seen_from or mesh
     targets = lamp_targets(lamp, min(samples, BATCH))
     local_eye, rows = (eye - mesh.origin).astype(np.float32), shapes.rows(mesh)
     step = max(1, (1 << 20) // len(targets))
@@ -230,7 +246,7 @@ def lamp_layer(
         seen = occlusion_rays(
             shadow,
             positions,
-            mesh.normals[block],
+            level.normals[block],
             targets,
             workers,
             job,
@@ -241,18 +257,19 @@ def lamp_layer(
         def run(
             start: int,
             stop: int,
-            block: Points = block,
-            towards: F32 = towards,
-            weight: F32 = weight,
-            seen: Bools = seen,
+            block: Points,
+            towards: F32,
+            weight: F32,
+            seen: Bools,
+            facing: Facing,
         ) -> None:
             lamp_terms(
                 start,
                 stop,
                 block,
-                mesh.positions,
-                mesh.normals,
-                mesh.tangents,
+                facing.mesh.positions,
+                facing.mesh.normals,
+                facing.mesh.tangents,
                 rows,
                 local_eye,
                 towards,
@@ -263,11 +280,23 @@ def lamp_layer(
                 shapes.terms,
                 shapes.offset,
                 shapes.data,
-                layer.terms,
-                layer.irradiance,
+                facing.terms,
+                facing.irradiance,
             )
 
-        workers.run(len(block), POINTS, run, job)
+        for facing in ways:
+            some = facing.some(block)
+            own = partial(
+                run,
+                block=block[some],
+                towards=towards[some] if len(towards) > 1 else towards,
+                weight=weight[some] if len(weight) > 1 else weight,
+                seen=seen[some],
+                facing=facing,
+            )
+            workers.run(len(block[some]), POINTS, own, job)
+    if layer.tilts is not None:
+        gather_tilts(shapes, mesh, ways, layer.tilts)
     return layer
 
 

@@ -22,11 +22,12 @@ from studio_core.scene.geometry import Image
 from studio_core.scene.nodes import Material, Scene
 from studio_core.shading.artifacts import Surfaces
 from studio_core.shading.materials import Resolved, coefficients, linear_rgb, resolve
+from studio_core.shading.pyramids import LEVELS, Pyramid, joined, lay_out, pyramid
+from studio_core.shading.reliefs import Reliefs, ReliefTable
 
 F32 = npt.NDArray[np.float32]
 I64 = npt.NDArray[np.int64]
 
-LEVELS = 12
 PROBES = 33
 AFFINE_WITHIN = 1e-5  # of the largest coefficient
 
@@ -53,30 +54,19 @@ class Maps:
 class Coefficients:
     """Coefficients (M, T·3) are plain + slope · texel, or rows of a map; `typical` are their means.
 
-    T is the most terms that one of the materials has.
+    T is the most terms that one of the materials has. `reliefs` are their normal maps, None without any.
     """
 
     plain: F32
     slope: F32
     typical: F32
     maps: Maps
+    reliefs: Reliefs | None = None
 
     @property
     def width(self) -> int:
         """T."""
         return int(self.plain.shape[1] // 3)
-
-
-@dataclass(eq=False)
-class _Pyramid:
-    """Levels (h, w, C) from the finest, and the least and largest value of each channel.
-
-    Once stored, the levels are views of the one array that kernels read.
-    """
-
-    levels: tuple[F32, ...]
-    low: F32
-    high: F32
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,7 +78,7 @@ class _Look:
     plain: F32
     slope: F32
     typical: F32
-    pyramid: _Pyramid | None
+    pyramid: Pyramid | None
     picture: tuple[str, bool] | None
     uv_map: F32
 
@@ -99,14 +89,15 @@ class CoefficientTable:
     def __init__(self, registry: Registry) -> None:
         self._registry = registry
         self._looks: dict[str, _Look] = {}
-        self._pictures: dict[tuple[str, bool], _Pyramid] = {}
+        self._pictures: dict[tuple[str, bool], Pyramid] = {}
         self._made: tuple[tuple[_Look, ...], Coefficients] | None = None
-        self._stored: dict[int, tuple[tuple[_Pyramid, ...], F32, list[int]]] = {}
+        self._reliefs = ReliefTable()
+        self._stored: dict[int, tuple[tuple[Pyramid, ...], F32, list[int]]] = {}
 
     def __call__(self, scene: Scene, surfaces: Surfaces) -> Coefficients:
         """The table for `surfaces.materials`; the same object while none of them changes."""
         looks: dict[str, _Look] = {}
-        pictures: dict[tuple[str, bool], _Pyramid] = {}
+        pictures: dict[tuple[str, bool], Pyramid] = {}
         for name in surfaces.materials:
             material, look = scene.material(name), self._looks.get(name)
             if look is None or look.material is not material:
@@ -120,7 +111,7 @@ class CoefficientTable:
             self._made = made, self._assemble(made)
         return self._made[1]
 
-    def _look(self, material: Material, pictures: dict[tuple[str, bool], _Pyramid]) -> _Look:
+    def _look(self, material: Material, pictures: dict[tuple[str, bool], Pyramid]) -> _Look:
         bare = dataclasses.replace(material, textures=frozen_map()) if material.catches else material
         resolved = resolve(bare, self._registry)  # what catches shadows shows no picture of its own
         if not resolved.textures:
@@ -139,7 +130,7 @@ class CoefficientTable:
                 mean = np.tile(found.levels[-1].mean(axis=(0, 1), dtype=np.float32), len(plain) // 3)
                 typical = plain + slope * mean
                 return _Look(material, AFFINE, plain, slope, typical, found, key, _uv_map(resolved))
-        own = _pyramid(coefficients(resolved).reshape(*_map_size(resolved), -1))
+        own = pyramid(coefficients(resolved).reshape(*_map_size(resolved), -1))
         typical = own.levels[-1].mean(axis=(0, 1), dtype=np.float32)
         none = np.zeros_like(typical)
         return _Look(material, GENERAL, none, none, typical, own, None, _uv_map(resolved))
@@ -158,10 +149,7 @@ class CoefficientTable:
             for m, look in enumerate(looks):
                 if look.kind != which or look.pyramid is None:
                     continue
-                at = begin[look.pyramid]
-                for level, values in enumerate(look.pyramid.levels):
-                    first[m, level], size[m, level] = at, values.shape[:2]
-                    at += values.shape[0] * values.shape[1]
+                lay_out(look.pyramid, begin[look.pyramid], first[m], size[m])
         for m, look in enumerate(looks):
             kind[m], uv_map[m] = look.kind, look.uv_map
             own = len(look.plain)
@@ -170,41 +158,17 @@ class CoefficientTable:
         maps = Maps(kind, arrays[AFFINE], arrays[GENERAL], first, size, levels, uv_map)
         if self._made is not None and _same(maps, self._made[1].maps):
             maps = self._made[1].maps
-        return Coefficients(plain, slope, typical, maps)
+        reliefs = self._reliefs([look.material for look in looks])
+        return Coefficients(plain, slope, typical, maps, reliefs)
 
-    def _store(self, which: int, pyramids: tuple[_Pyramid, ...], channels: int) -> tuple[F32, list[int]]:
+    def _store(self, which: int, pyramids: tuple[Pyramid, ...], channels: int) -> tuple[F32, list[int]]:
         """All levels of some pyramids as rows, and where each pyramid starts; kept while they stay."""
         kept = self._stored.get(which)
         if kept is not None and kept[0] == pyramids and kept[1].shape[1] == channels:
             return kept[1], kept[2]
-        rows = [_columns(level, channels) for pyramid in pyramids for level in pyramid.levels]
-        lengths = [sum(level.shape[0] * level.shape[1] for level in p.levels) for p in pyramids]
-        starts = np.concatenate([[0], np.cumsum(lengths)]).astype(np.int64).tolist()[:-1]
-        joined = np.concatenate(rows) if rows else np.zeros((1, channels), np.float32)
-        for pyramid, start in zip(pyramids, starts, strict=True):
-            pyramid.levels = _views(joined, start, pyramid.levels)
-        self._stored[which] = pyramids, joined, starts
-        return joined, starts
-
-
-def _columns(level: F32, channels: int) -> F32:
-    """A level as rows of as many channels as the material with most terms has."""
-    own = level.reshape(-1, level.shape[2])
-    if own.shape[1] == channels:
-        return own
-    made = np.zeros((len(own), channels), np.float32)
-    made[:, : own.shape[1]] = own[:, :channels]
-    return made
-
-
-def _views(joined: F32, start: int, levels: tuple[F32, ...]) -> tuple[F32, ...]:
-    """The same levels as parts of the rows that they were joined to."""
-    made = []
-    for level in levels:
-        stop = start + level.shape[0] * level.shape[1]
-        made.append(joined[start:stop].reshape(*level.shape[:2], joined.shape[1]))
-        start = stop
-    return tuple(made)
+        made, starts = joined(pyramids, channels)
+        self._stored[which] = pyramids, made, starts
+        return made, starts
 
 
 def _same(a: Maps, b: Maps) -> bool:
@@ -220,22 +184,9 @@ def _picture_key(resolved: Resolved) -> tuple[str, bool]:
     return texture.image.key, np.ndim(np.asarray(resolved.values[name])) == 0
 
 
-def _picture(image: Image, grey: bool) -> _Pyramid:
+def _picture(image: Image, grey: bool) -> Pyramid:
     texels = linear_rgb(image)[::-1]
-    return _pyramid(np.repeat(texels[..., :1], 3, axis=2) if grey else texels)
-
-
-def _pyramid(base: F32) -> _Pyramid:
-    """Halved down to one texel, at most LEVELS times."""
-    level = np.ascontiguousarray(base)
-    levels = [level]
-    while max(level.shape[:2]) > 1 and len(levels) < LEVELS:
-        height, width = max(level.shape[0] // 2, 1), max(level.shape[1] // 2, 1)
-        y, x = level.shape[0] // height, level.shape[1] // width
-        cut = level[: height * y, : width * x].reshape(height, y, width, x, level.shape[2])
-        level = cut.mean(axis=(1, 3), dtype=np.float32)
-        levels.append(level)
-    return _Pyramid(tuple(levels), base.min(axis=(0, 1)), base.max(axis=(0, 1)))
+    return pyramid(np.repeat(texels[..., :1], 3, axis=2) if grey else texels)
 
 
 def _map_size(resolved: Resolved) -> tuple[int, int]:
@@ -249,7 +200,7 @@ def _uv_map(resolved: Resolved) -> F32:
     return np.array([1, 0, 0, 0, 1, 0], np.float32)
 
 
-def _line(resolved: Resolved, picture: _Pyramid) -> tuple[F32, F32] | None:
+def _line(resolved: Resolved, picture: Pyramid) -> tuple[F32, F32] | None:
     """Coefficients (T·3,) at texel 0 and their slopes, channel by channel; None where they bend."""
     low, high = picture.low.astype(np.float64), picture.high.astype(np.float64)
     ramp = np.linspace(0, 1, PROBES)[:, None]

@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from studio_core.contract import Services
 from studio_core.raster import Coefficients, CoefficientTable, Compositor
-from studio_core.scene.nodes import Light, NodeId
+from studio_core.scene.nodes import Light, NodeId, Scene
 from studio_core.scene.shading_mesh import NO_BACK
 from studio_core.scene.tangents import arbitrary_tangents, perpendicular
 from studio_core.shading.artifacts import (
@@ -34,7 +34,9 @@ from studio_core.shading.artifacts import (
 from studio_core.shading.brute_force import VisibilityBits, all_points, environment_layer, lamp_layer
 from studio_core.shading.frame import Frame
 from studio_core.shading.job import Job
+from studio_core.shading.normal_maps import normal_texture, normals_at, strength
 from studio_core.shading.pipeline import Pipeline
+from studio_core.shading.tilting import turned_points
 from studio_core.shading.varying import ShapeTable
 
 F32 = npt.NDArray[np.float32]
@@ -102,7 +104,8 @@ class ErrorMeter:
         points = surface_points(surfaces, seen, frame)
         uvs = surface_uvs(surfaces, seen, frame)
         there = self._shapes.at(frame.scene, surfaces.materials, points.material, uvs)
-        truth = self._brute(points, there, lighting, casters, frame, job)
+        facing = mapped_points(frame.scene, surfaces, points, uvs)
+        truth = self._brute(points, facing, there, lighting, casters, frame, job)
         looks, lights = self._compositor.coefficients(surfaces, seen, table), _lights(frame)
         caught, photograph = self._compositor.photograph(frame.scene, surfaces, seen, chosen)
         before = self._compositor.photographed_light(frame.scene, points.normals[caught])
@@ -147,7 +150,7 @@ class ErrorMeter:
             mesh.inset[some],
             mesh.material[some],
         )
-        truth = self._brute(points, shapes.of_points(some), lighting, casters, frame, job)
+        truth = self._brute(points, points, shapes.of_points(some), lighting, casters, frame, job)
         lights = _lights(frame)
         looks = table.typical[mesh.material[some]].reshape(-1, table.width, 3)
         shown = (radiance.combined(lights)[some] * looks).sum(axis=1)
@@ -158,23 +161,26 @@ class ErrorMeter:
     def _brute(
         self,
         points: ShadingPoints,
+        facing: ShadingPoints,
         shapes: Shapes,
         lighting: Lighting,
         casters: Casters,
         frame: Frame,
         job: Job,
     ) -> dict[NodeId, LayerRadiance]:
+        """Light that is let through to the points, on surfaces that face as `facing` does."""
+        shapes = dataclasses.replace(shapes, tilt=None)
         every, eye = all_points(points), np.asarray(frame.view.transform.translation, np.float64)
         made = {
             lamp.node: lamp_layer(
-                points, shapes, casters.shadow, lamp, eye, every, LAMP_SAMPLES, self._workers, job
+                facing, shapes, casters.shadow, lamp, eye, every, LAMP_SAMPLES, self._workers, job, points
             )
             for lamp in lighting.lamps
         }
         if lighting.environment is not None:
             bits = VisibilityBits(points, casters.shadow, self._workers)
             made[lighting.environment.id] = environment_layer(
-                points, shapes, lighting, bits, eye, every, LEVEL, self._workers, job
+                facing, shapes, lighting, bits, eye, every, LEVEL, self._workers, job
             )
         return made
 
@@ -194,6 +200,18 @@ def surface_points(surfaces: Surfaces, hits: Hits, frame: Frame) -> ChosenPoints
         np.zeros((len(corners), 3), np.float32),
         mesh.material[corners[:, 0]],
     )
+
+
+def mapped_points(scene: Scene, surfaces: Surfaces, points: ChosenPoints, uvs: F32) -> ChosenPoints:
+    """The points with the normals that maps have at uvs (P, 2), where materials have such; not averaged."""
+    normals = np.tile(np.array([0, 0, 1], np.float32), (len(uvs), 1))
+    mapped = False
+    for number, name in enumerate(surfaces.materials):
+        material = scene.material(name)
+        texture, own = normal_texture(material), np.flatnonzero(points.material == number)
+        if texture is not None and len(own):
+            normals[own], mapped = normals_at(texture, strength(material), uvs[own]), True
+    return turned_points(points, normals) if mapped else points
 
 
 def surface_uvs(surfaces: Surfaces, hits: Hits, frame: Frame) -> F32:

@@ -16,6 +16,7 @@ from studio_core.params import Value, check, defaults, param_infos
 from studio_core.scene.geometry import Image, Table, Texture
 from studio_core.scene.nodes import Material, MaterialId, Scene
 from studio_core.shading.artifacts import TERMS, Shapes
+from studio_core.shading.normal_maps import mean_slope, slope_of
 
 FALLBACK = "lambert"
 
@@ -138,8 +139,9 @@ def shapes(
     materials: Sequence[MaterialId],
     registry: Registry,
     mean: Callable[[Image], float] | None = None,
+    steep: Callable[[Image], float] = mean_slope,
 ) -> Shapes:
-    """The table of BRDF kernels for `materials`; see `Resolved.typical` for `mean`."""
+    """The table of BRDF kernels for `materials`; see `Resolved.typical` and `slope_of` for the means."""
     address, terms, offset, problems = [], [], [], []
     data: list[npt.NDArray[np.float32]] = []
     tables: list[Table] = []
@@ -157,7 +159,8 @@ def shapes(
             problems.append(resolved.problem)
     flat = np.concatenate([*data, np.zeros(1, np.float32)])
     made = (np.array(address, np.int64), np.array(terms, np.int64), np.array(offset, np.int64))
-    return Shapes(*made, flat, tuple(problems), tuple(tables))
+    tilt = np.array([slope_of(scene.material(name), steep) for name in materials], np.float32)
+    return Shapes(*made, flat, tuple(problems), tuple(tables), tilt=tilt if tilt.any() else None)
 
 
 def finite_shape(brdf: Brdf, values: Mapping[str, Value]) -> npt.NDArray[np.float32]:
@@ -173,7 +176,13 @@ def same_shapes(a: Shapes, b: Shapes) -> bool:
     pairs = ((a.address, b.address), (a.terms, b.terms), (a.offset, b.offset), (a.data, b.data))
     if (a.row is None) != (b.row is None) or not all(np.array_equal(x, y) for x, y in pairs):
         return False
+    if (a.tilt is None) != (b.tilt is None) or not np.array_equal(_of(a.tilt), _of(b.tilt)):
+        return False
     return a.row is None or b.row is None or a.row is b.row or np.array_equal(a.row, b.row)
+
+
+def _of(tilt: npt.NDArray[np.float32] | None) -> npt.NDArray[np.float32]:
+    return np.zeros(0, np.float32) if tilt is None else tilt
 
 
 def coefficients(resolved: Resolved, width: int = 0) -> npt.NDArray[np.float32]:

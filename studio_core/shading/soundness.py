@@ -6,7 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from studio_core.shading.artifacts import Hits, Radiance
+from studio_core.kernels.tilted import FIELDS
+from studio_core.shading.artifacts import Hits, LayerRadiance, Radiance
 
 
 class UnsoundError(ValueError):
@@ -36,13 +37,20 @@ class Soundness:
         for node, layer in radiance.layers.items():
             _fits(f"terms of {node}", layer.terms, (count, width, 3), np.float32)
             _fits(f"irradiance of {node}", layer.irradiance, (count, 3), np.float32)
-            for numbers in (layer.terms, layer.irradiance):
+            if layer.tilts is not None:
+                _fits(f"tilts of {node}", layer.tilts, (count, FIELDS, width, 3), np.float32)
+            for numbers in _numbers(layer):
                 if id(numbers) not in known:
                     _finite(numbers, radiance)
         if not (id(hits) in known and id(mesh) in known):
             _check_hits(hits, len(mesh.faces))
-        seen = [part for layer in radiance.layers.values() for part in (layer.terms, layer.irradiance)]
+        seen = [part for layer in radiance.layers.values() for part in _numbers(layer)]
         self._sound = (hits, mesh, *seen)
+
+
+def _numbers(layer: LayerRadiance) -> tuple[np.ndarray[Any, Any], ...]:
+    own = (layer.terms, layer.irradiance)
+    return own if layer.tilts is None else (*own, layer.tilts)
 
 
 def _check_hits(hits: Hits, faces: int) -> None:

@@ -27,6 +27,7 @@ from studio_core.scene.shading_mesh import NO_BACK
 from studio_core.scene.world_mesh import WorldMesh
 from studio_core.shading.artifacts import Shapes
 from studio_core.shading.materials import Resolved, finite_shape, first_channel, resolve, shapes
+from studio_core.shading.normal_maps import mean_slope
 
 F32 = npt.NDArray[np.float32]
 I32 = npt.NDArray[np.int32]
@@ -126,6 +127,7 @@ class ShapeTable:
     def __init__(self, registry: Registry) -> None:
         self._registry = registry
         self._pictures: dict[str, Grey] = {}
+        self._slopes: dict[str, float] = {}
         self._uvs: F32 | None = None
         self._areas: F32 = np.zeros(0, np.float32)
         self._kept: dict[MaterialId, tuple[Mapping[str, Texture], I64, Steps]] = {}
@@ -169,7 +171,15 @@ class ShapeTable:
                 found[number] = resolved
         used = {t.image.key: t.image for resolved in found.values() for t in resolved.shaping.values()}
         self._pictures = {key: self._pictures.get(key) or Grey.of(image) for key, image in used.items()}
-        base = shapes(scene, materials, self._registry, lambda image: self._pictures[image.key].mean)
+        slopes, self._slopes = self._slopes, {}
+
+        def steep(image: Image) -> float:
+            if image.key not in self._slopes:
+                known = slopes.get(image.key)
+                self._slopes[image.key] = mean_slope(image) if known is None else known
+            return self._slopes[image.key]
+
+        base = shapes(scene, materials, self._registry, lambda image: self._pictures[image.key].mean, steep)
         return base, found
 
     def _steps(self, resolved: Resolved, uvs: F32, area: F32) -> Steps:
@@ -222,6 +232,7 @@ def _extended(base: Shapes, material: I32, found: Sequence[tuple[int, Resolved, 
         data=flat,
         owner=of,
         row=row,
+        tilt=None if base.tilt is None else base.tilt[of],
     )
 
 

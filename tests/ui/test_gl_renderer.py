@@ -111,7 +111,21 @@ METAL = {
     "model": "ggx",
     "textures": frozen_map({"base_color": Texture(PICTURE), "metallic": Texture(GREY)}),
 }
+BUMPS = Texture(Image(RNG.integers(60, 256, (23, 31, 3), dtype=np.uint8), "data"), (2.0, 3.0), (0.3, 0.1))
 SCENES = {
+    "normal map": scene_of(**ROUGH, textures=frozen_map({"normal": BUMPS})),
+    "normal map of small texels": scene_of(
+        **ROUGH, textures=frozen_map({"normal": dataclasses.replace(BUMPS, scale=(40.0, -25.0))})
+    ),
+    "picture and normal map": scene_of(
+        model="ggx", textures=frozen_map({**COLOURED["textures"], "normal": BUMPS})
+    ),
+    "two pictures and normal map": scene_of(
+        model="ggx", textures=frozen_map({**METAL["textures"], "normal": BUMPS})
+    ),
+    "glass with a normal map": scene_of(
+        *sheets(3), **ROUGH, opacity=0.6, textures=frozen_map({"normal": BUMPS})
+    ),
     "plain": scene_of(**ROUGH),
     "picture": scene_of(**COLOURED),
     "picture of small texels": scene_of(**FINE),

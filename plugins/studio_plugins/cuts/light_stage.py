@@ -87,6 +87,8 @@ class LightStage:
         wanted = quality(frame.params.quality)
         shapes = inputs[Shapes]
         by_row = np.array([not lobe.flat for lobe in self._lobes(shapes)] + [False], np.bool_)
+        if shapes.tilt is not None:  # leaning normals ask where light is from
+            by_row[:-1] |= shapes.tilt > 0
         glossy = by_row[shapes.rows(mesh)]
         summed = looked = 0
         if lighting.environment is not None and lighting.tree is not None:

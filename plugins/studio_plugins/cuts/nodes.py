@@ -27,6 +27,7 @@ Bools = npt.NDArray[np.bool_]
 FLOATS = 6  # a node: x, y, z, red, green, blue
 NO_BLOCK = -1
 _BLOCKS_A_CHUNK = 2
+_NO_TILT, _NO_TILTS = np.zeros(0, np.float32), np.zeros((0, 0, 0, 0), np.float32)
 
 
 @dataclass(frozen=True)
@@ -169,11 +170,15 @@ class NodeTable:
         out: F32,
         workers: Workers,
         job: Job,
+        tilts: F32 | None = None,
     ) -> int:
         """Adds to terms (V, T, 3) of the wanted vertices, as seen from `eye`; how many nodes were looked at.
 
-        The eye is relative to the mesh's origin.
+        The eye is relative to the mesh's origin. `tilts` (V, FIELDS, T, 3) are added to as well.
         """
+        leaning = (
+            (_NO_TILT, out, _NO_TILTS) if tilts is None or shapes.tilt is None else (shapes.tilt, out, tilts)
+        )
         numbered = self.numbered()
         looked, rows = np.zeros(len(numbered), np.int64), shapes.rows(mesh)
 
@@ -197,7 +202,7 @@ class NodeTable:
                     shapes.terms,
                     shapes.offset,
                     shapes.data,
-                    out,
+                    *leaning,
                 )
 
         workers.run(len(numbered), _BLOCKS_A_CHUNK, body, job)

@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from studio_core.contract import Services
+from studio_core.kernels.tilted import FIELDS
 from studio_core.scene.diff import Aspect
 from studio_core.scene.nodes import NodeId
 from studio_core.shading.artifacts import Hits, LayerRadiance, Radiance, ShadingPoints, Shapes, Surfaces
@@ -45,7 +46,7 @@ class RadianceStage:
         self._workers = services.workers
         self._layers: dict[NodeId, _Layer] = {}
         self._eye: tuple[float, ...] = ()
-        self._kernels: dict[tuple[int, bytes], int] = {}
+        self._kernels: dict[tuple[int, bytes, float], int] = {}
         self._numbering = itertools.count(1)
         self._kernel: I64 = np.zeros(0, np.int64)
         self._material: npt.NDArray[np.int32] = np.zeros(0, np.int32)
@@ -81,6 +82,7 @@ class RadianceStage:
                 dirty = summed
                 terms = np.zeros((count, shapes.width, 3), np.float32)
                 irradiance = np.zeros((count, 3), np.float32)
+                tilts = _blank_tilts(count, shapes)
             else:
                 fresh = ~other
                 for was, is_ in zip(before.version, versions, strict=True):
@@ -92,13 +94,17 @@ class RadianceStage:
                     continue
                 terms, irradiance = before.radiance.terms.copy(), before.radiance.irradiance.copy()
                 terms[dirty] = 0
+                tilts = _tilts_of(before.radiance, shapes)
+                if tilts is not None:
+                    tilts[dirty] = 0
             rows = np.flatnonzero(dirty)
             irradiance[rows] = _irradiance(pairs, rows)
             for nodes, instead in pairs:
                 own = dirty if instead is None else dirty & ~instead.owned
-                looked += nodes.shade(mesh, shapes, local_eye, own, terms, self._workers, job)
+                given = (terms, self._workers, job, tilts)
+                looked += nodes.shade(mesh, shapes, local_eye, own, *given)
                 if instead is not None:
-                    looked += instead.shade(mesh, shapes, local_eye, dirty, terms, self._workers, job)
+                    looked += instead.shade(mesh, shapes, local_eye, dirty, *given)
             shaded += len(rows)
             done = [
                 np.where(dirty, v, np.where(other, -1, w))
@@ -112,9 +118,12 @@ class RadianceStage:
                 if node in arriving.standing:
                     past, known = arriving.standing[node]
                     settled = settled | lift(seen.between, summed, rest, settled, past, known, irradiance)
-                fill(seen.between, mesh.material, summed, rest, settled, terms, irradiance)
+                between = (seen.between, mesh.material, summed, rest, settled)
+                if tilts is not None:  # first: what is not settled gets its irradiance with the terms
+                    fill(*between, tilts.reshape(count, -1, 3), irradiance.copy())
+                fill(*between, terms, irradiance)
                 done = [np.where(rest, -1, version) for version in done]
-            layers[node] = LayerRadiance(terms, irradiance)
+            layers[node] = LayerRadiance(terms, irradiance, tilts)
             kept[node] = _Layer(layers[node], done)
         self._layers, self._eye, self._kernel, self._material = kept, eye, kernel, mesh.material
         self._positions, self._numbers = mesh.positions, numbers
@@ -134,12 +143,30 @@ class RadianceStage:
         """(V,) a number for each vertex' kernel and shape: the same while they are; 0 without a material."""
         bounds = np.append(shapes.offset, len(shapes.data))
         rows = [
-            (int(address), shapes.data[begin:end].tobytes())
-            for address, begin, end in zip(shapes.address, bounds[:-1], bounds[1:], strict=True)
+            (int(address), shapes.data[begin:end].tobytes(), float(steep))
+            for address, begin, end, steep in zip(
+                shapes.address, bounds[:-1], bounds[1:], _tilt_of(shapes), strict=True
+            )
         ]
         known = self._kernels
         self._kernels = {row: known[row] if row in known else next(self._numbering) for row in set(rows)}
         return np.array([*(self._kernels[row] for row in rows), 0], np.int64)[shapes.rows(mesh)]
+
+
+def _tilt_of(shapes: Shapes) -> F32:
+    return np.zeros(len(shapes.address), np.float32) if shapes.tilt is None else shapes.tilt
+
+
+def _blank_tilts(count: int, shapes: Shapes) -> F32 | None:
+    """(V, FIELDS, T, 3); None where no material has a normal map."""
+    return None if shapes.tilt is None else np.zeros((count, FIELDS, shapes.width, 3), np.float32)
+
+
+def _tilts_of(radiance: LayerRadiance, shapes: Shapes) -> F32 | None:
+    """Those of a layer, to be changed; blank where it had none and now has."""
+    if shapes.tilt is None or radiance.tilts is None:
+        return _blank_tilts(len(radiance.terms), shapes)
+    return radiance.tilts.copy()
 
 
 def _irradiance(pairs: tuple[tuple[NodeTable, NodeTable | None], ...], rows: I64) -> F32:

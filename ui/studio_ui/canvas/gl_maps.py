@@ -6,6 +6,7 @@ read texel by texel: the levels are those of the raster canvas, sizes that are n
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,6 +16,7 @@ from vispy import gloo
 
 from studio_core.kernels.compose import AFFINE
 from studio_core.shading.coefficients import Maps
+from studio_core.shading.reliefs import Reliefs
 from studio_ui.canvas.gl_buffers import Tally
 
 F32 = npt.NDArray[np.float32]
@@ -37,41 +39,63 @@ class Atlas:
 
 
 class Atlases:
-    """One for each pyramid that some material of the picture shows."""
+    """One for each pyramid that some material of the picture shows, normal maps among them."""
 
     def __init__(self, tally: Tally, largest: int) -> None:
         self._tally, self._largest = tally, largest
         self._maps: Maps | None = None
+        self._reliefs: Reliefs | None = None
         self._of: dict[int, Atlas] = {}
+        self._relief_of: dict[int, Atlas] = {}
 
-    def update(self, maps: Maps) -> bool:
+    def update(self, maps: Maps, reliefs: Reliefs | None = None) -> bool:
         """Make what these maps need and give back what they do not; whether anything changed."""
-        if maps is self._maps:
-            return False
-        old = list(dict.fromkeys(self._of.values()))
+        changed = maps is not self._maps or reliefs is not self._reliefs
+        if maps is not self._maps:
+            wanted = np.flatnonzero(maps.kind).tolist()
+            starts = {m: (int(maps.kind[m]), int(maps.first[m, 0])) for m in wanted}
+            self._of = self._followed(self._of, starts, lambda m: _levels(maps, m))
+        if reliefs is not self._reliefs:
+            starts = {}
+            if reliefs is not None:
+                starts = {m: (0, int(reliefs.first[m, 0])) for m in np.flatnonzero(reliefs.levels).tolist()}
+            self._relief_of = self._followed(self._relief_of, starts, lambda m: _relief_levels(reliefs, m))
+        self._maps, self._reliefs = maps, reliefs
+        return changed
+
+    def _followed(
+        self,
+        had: dict[int, Atlas],
+        starts: dict[int, tuple[int, int]],
+        levels_of: Callable[[int], list[F32]],
+    ) -> dict[int, Atlas]:
+        """Atlases by material, one for each start; those of `had` that show the same are taken."""
+        old = list(dict.fromkeys(had.values()))
         made: dict[int, Atlas] = {}
         by_start: dict[tuple[int, int], Atlas] = {}
-        for material in np.flatnonzero(maps.kind).tolist():
-            place = (int(maps.kind[material]), int(maps.first[material, 0]))
+        for material, place in starts.items():
             if place not in by_start:
-                levels = _levels(maps, material)
+                levels = levels_of(material)
                 kept = next((a for a in old if _same(a.base, levels[0])), None)
                 by_start[place] = kept or self._atlas(levels)
             made[material] = by_start[place]
         for atlas in old:
             if all(atlas is not other for other in made.values()):
                 atlas.delete()
-        self._maps, self._of = maps, made
-        return True
+        return made
+
+    def relief(self, material: int) -> Atlas | None:
+        """Of its normal map."""
+        return self._relief_of.get(material)
 
     def __getitem__(self, material: int) -> Atlas:
         return self._of[material]
 
     def clear(self) -> None:
         """Give everything back."""
-        for atlas in dict.fromkeys(self._of.values()):
+        for atlas in dict.fromkeys((*self._of.values(), *self._relief_of.values())):
             atlas.delete()
-        self._of, self._maps = {}, None
+        self._of, self._relief_of, self._maps, self._reliefs = {}, {}, None, None
 
     def _atlas(self, levels: list[F32]) -> Atlas:
         base = levels[0]
@@ -108,7 +132,14 @@ def picture(pixels: F32, internalformat: str) -> Any:
 
 
 def _levels(maps: Maps, material: int) -> list[F32]:
-    rows = maps.texels if maps.kind[material] == AFFINE else maps.tables
+    return _cut(maps.texels if maps.kind[material] == AFFINE else maps.tables, maps, material)
+
+
+def _relief_levels(reliefs: Reliefs | None, material: int) -> list[F32]:
+    return [] if reliefs is None else _cut(reliefs.texels, reliefs, material)
+
+
+def _cut(rows: F32, maps: Maps | Reliefs, material: int) -> list[F32]:
     made = []
     for level in range(int(maps.levels[material])):
         first, (high, wide) = int(maps.first[material, level]), maps.size[material, level].tolist()

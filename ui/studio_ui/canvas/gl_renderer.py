@@ -8,6 +8,7 @@ its gloo canvas the current one, whenever anything here is called.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Container
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
@@ -25,6 +26,7 @@ from studio_core.shading.primary import LAYERS
 from studio_ui.canvas import gl_shaders as shaders
 from studio_ui.canvas.gl_buffers import Tally
 from studio_ui.canvas.gl_camera import Camera
+from studio_ui.canvas.gl_maps import Atlas
 from studio_ui.canvas.gl_scene import Batch, Body, GlScene, Places
 from studio_ui.canvas.gl_sky import Sky
 from studio_ui.canvas.gl_sky_shaders import BACKDROP_FRAGMENT
@@ -152,11 +154,10 @@ class Renderer:
 
     def compile(self) -> None:
         """Try out all programs without drawing anything."""
-        for kind in (CONSTANT, AFFINE, GENERAL):
-            for peeled in (False, True):
-                terms = {AFFINE: 1, GENERAL: 3}.get(kind, 0)
-                self._program((kind, peeled, terms), *shaders.mesh_program(kind, peeled, LEVELS, terms))
-        self._program((CAUGHT, False, 0), *shaders.mesh_program(CAUGHT, False, LEVELS))
+        for kind, peeled in itertools.product((CONSTANT, AFFINE, GENERAL), (False, True)):
+            terms = {AFFINE: 1, GENERAL: 3}.get(kind, 0)
+            self._mesh_program(kind, peeled, terms, relief=False)
+        self._mesh_program(CAUGHT, False, 0, relief=False)
         self._program("plain", *shaders.plain_program(shaders.PLAIN_FRAGMENT))
         self._program("layer", *shaders.plain_program(shaders.LAYER_FRAGMENT))
         self._program("backdrop", shaders.SCREEN_VERTEX, BACKDROP_FRAGMENT)
@@ -189,22 +190,23 @@ class Renderer:
     def _mesh(self, look: Look, camera: Camera, gain: float, clear: bool, layer: Target | None) -> None:
         """All batches of one sort, by kind of coefficients."""
         own = list(self.scene.draws(clear))
-        for kind in (CONSTANT, AFFINE, CAUGHT, GENERAL):
-            batches = [(body, batch) for _, body, batch in own if batch.kind == kind]
+        for kind, relief in itertools.product((CONSTANT, AFFINE, CAUGHT, GENERAL), (False, True)):
+            batches = [
+                (b, batch) for _, b, batch in own if (batch.kind, batch.relief is not None) == (kind, relief)
+            ]
             if not batches:
                 continue
             if kind == CAUGHT and self._sky.backdrop is None:
                 kind = CONSTANT  # there is no photograph: it is as black as it is by itself
             terms = max(len(batch.atlas.textures) if batch.atlas else 0 for _, batch in batches)
-            sources = shaders.mesh_program(kind, layer is not None, LEVELS, terms)
-            program = self._program((kind, layer is not None, terms), *sources)
+            program = self._mesh_program(kind, layer is not None, terms, relief)
             program["u_projection"] = camera.projection.T
             program["u_gain"] = gain
             if layer is not None:
                 program["u_layer"], program["u_size"] = layer.texture, layer.size
             if kind == CAUGHT:
                 self._sky.under(program, look.view)
-            elif kind != CONSTANT:
+            elif kind != CONSTANT or relief:
                 rows = look.view.height * look.samples
                 program["u_pixel_angle"] = float(2 * np.tan(np.radians(look.view.fov) / 2) / rows)
             for body, batch in batches:
@@ -219,14 +221,18 @@ class Renderer:
         program["a_plain"] = body.plain.buffer
         if batch.kind == CAUGHT and self._sky.backdrop is not None:
             program["a_slope"] = body.slope.buffer
-        atlas = batch.atlas
+        atlas, fine = batch.atlas, batch.relief
+        if atlas is not None or fine is not None:
+            program["a_uv"] = body.shape.uvs.buffer
+        if fine is not None:
+            _lay(program, "u_relief_", fine, batch.relief_map)
+            program["u_relief_turn"] = batch.relief_map[6:]
+            program["u_relief"] = fine.textures[0]
+            for number in range({CONSTANT: 3, AFFINE: 6}.get(batch.kind, 4)):
+                program[f"a_bend{number}"] = body.bends[number].buffer
         if atlas is None:
             return
-        program["a_uv"] = body.shape.uvs.buffer
-        program["u_uv_u"], program["u_uv_v"] = batch.uv_map[:3], batch.uv_map[3:]
-        program["u_finest"] = atlas.finest
-        program["u_levels"] = float(atlas.levels)
-        program["u_atlas"] = atlas.size
+        _lay(program, "u_", atlas, batch.uv_map)
         for number, texture in enumerate(atlas.textures):
             program[f"u_map{number}"] = texture
         if batch.kind == AFFINE:
@@ -350,6 +356,12 @@ class Renderer:
         self.tally.draws += 1
         program.draw("triangles", indices)
 
+    def _mesh_program(self, kind: int, peeled: bool, terms: int, relief: bool) -> Any:
+        key = (kind, peeled, terms, relief)
+        if key in self._programs:
+            return self._programs[key]
+        return self._program(key, *shaders.mesh_program(kind, peeled, LEVELS, terms, relief))
+
     def _program(self, name: object, vertex: str, fragment: str) -> Any:
         if name not in self._programs:
             self._programs[name] = gloo.Program(vertex.strip(), fragment.strip())
@@ -369,3 +381,10 @@ class Renderer:
         nearest = self._nearest if np.isfinite(self._nearest) else 1.0
         near = nearest * (0.8 if same else 0.1) / float(np.hypot(np.hypot(*extent(view)), 1))
         return max(min(near, far / 4), NEAREST), far * 1.01
+
+
+def _lay(program: Any, prefix: str, atlas: Atlas, uv_map: tuple[float, ...]) -> None:
+    """Where a map lies, and how large it is."""
+    program[f"{prefix}uv_u"], program[f"{prefix}uv_v"] = uv_map[:3], uv_map[3:6]
+    program[f"{prefix}sizes"] = (*atlas.finest, *atlas.size)
+    program[f"{prefix}levels"] = float(atlas.levels)

@@ -11,11 +11,13 @@ import numpy.typing as npt
 from vispy import gloo
 
 from studio_core.kernels.compose import AFFINE, CAUGHT, CONSTANT, GENERAL
+from studio_core.kernels.relief import BEND
 from studio_core.scene.nodes import NodeId
 from studio_core.scene.shading_mesh import NO_BACK, ShadingMesh
 from studio_core.scene.transform import IDENTITY, Transform
 from studio_core.shading.artifacts import TERMS, Picture, Surfaces
 from studio_core.shading.coefficients import Maps
+from studio_core.shading.reliefs import Reliefs
 from studio_ui.canvas.gl_buffers import GROWTH, Attribute, Tally
 from studio_ui.canvas.gl_maps import Atlas, Atlases
 
@@ -37,6 +39,8 @@ class Batch:
     opacity: float
     atlas: Atlas | None
     uv_map: tuple[float, ...]
+    relief: Atlas | None = None
+    relief_map: tuple[float, ...] = ()
 
 
 @dataclass(eq=False)
@@ -71,6 +75,7 @@ class Body:
     plain: Attribute
     slope: Attribute
     sums: tuple[Attribute, ...]
+    bends: tuple[Attribute, ...]
     pictured: Transform = IDENTITY
     transform: Transform = IDENTITY  # where it is drawn
     shown: bool = True
@@ -78,9 +83,11 @@ class Body:
 
     def colours(self) -> tuple[Attribute, ...]:
         """What depends on light."""
-        return (self.plain, self.slope, *self.sums)
+        return (self.plain, self.slope, *self.sums, *self.bends)
 
 
+_Look = tuple[int, Atlas | None, tuple[float, ...], float, Atlas | None, tuple[float, ...]]
+"""Kind, atlas, its scale and offset, opacity, and the same of the normal map as of the atlas."""
 Places = Mapping[NodeId, Transform | None]
 """Where objects are in the world; None: not shown."""
 
@@ -114,7 +121,7 @@ class GlScene:
         if picture is self._picture or picture.colours is None:
             return
         mesh, colours = picture.radiance.surfaces.mesh, picture.colours
-        self.atlases.update(colours.maps)
+        self.atlases.update(colours.maps, colours.reliefs)
         self._typical = _typical(picture)
         wanted = {id(placed.mesh) for placed in mesh.objects}
         old = dict(zip(self.nodes, self.bodies, strict=True))
@@ -151,9 +158,10 @@ class GlScene:
         self.atlases.clear()
         self.bodies, self.nodes, self._shapes, self._picture = [], (), {}, None
 
-    def _attributes(self) -> tuple[Attribute, Attribute, tuple[Attribute, ...]]:
-        plain, slope, *sums = (Attribute(3, self.tally, "colours") for _ in range(2 + TERMS))
-        return plain, slope, tuple(sums)
+    def _attributes(self) -> tuple[Attribute, Attribute, tuple[Attribute, ...], tuple[Attribute, ...]]:
+        count = 2 + TERMS + BEND // 3
+        plain, slope, *more = (Attribute(3, self.tally, "colours") for _ in range(count))
+        return plain, slope, tuple(more[:TERMS]), tuple(more[TERMS:])
 
     def _shape(self, mesh: ShadingMesh, before: Body | None, wanted: set[int]) -> Shape:
         """The shape of a mesh; a finer or coarser one of the same object takes over what begins alike."""
@@ -187,7 +195,7 @@ class GlScene:
         mesh, maps = shape.mesh, colours.maps
         materials = surfaces.mesh.face_material[surfaces.mesh.faces_of(index)]
         used = np.unique(materials).tolist()
-        looks = {m: self._look(maps, surfaces, m) for m in used}
+        looks = {m: self._look(maps, colours.reliefs, surfaces, m) for m in used}
         key = (id(mesh), *((m, looks[m]) for m in used))
         if key in shape.lists:
             shape.lists[key] = found = shape.lists.pop(key)  # the newest is last
@@ -195,28 +203,29 @@ class GlScene:
         shape.forget(KEPT - 1)
         made: list[Batch] = []
         for look in dict.fromkeys(looks.values()):
-            kind, atlas, uv_map, opacity = look
+            kind, atlas, uv_map, opacity, *relief = look
             chosen = np.isin(materials, [m for m in used if looks[m] == look])
             sided = mesh.back_faces[:, 0] != NO_BACK
             single = mesh.faces[chosen & ~sided]
             double = np.concatenate([mesh.faces[chosen & sided], mesh.back_faces[chosen & sided][:, ::-1]])
             for faces, culled in ((double, True), (single, False)):
                 if len(faces):
-                    made.append(Batch(self._indices(faces), culled, kind, opacity, atlas, uv_map))
+                    made.append(Batch(self._indices(faces), culled, kind, opacity, atlas, uv_map, *relief))
         shape.lists[key] = mesh, tuple(made)  # holds the mesh, so that the key stays its own
         return tuple(made)
 
-    def _look(
-        self, maps: Maps, surfaces: Surfaces, material: int
-    ) -> tuple[int, Atlas | None, tuple[float, ...], float]:
+    def _look(self, maps: Maps, reliefs: Reliefs | None, surfaces: Surfaces, material: int) -> _Look:
         if material < 0:
-            return CONSTANT, None, (), 1.0
+            return CONSTANT, None, (), 1.0, None, ()
         own, alpha = int(maps.kind[material]), float(surfaces.opacity[material])
         if surfaces.catches[material]:
-            return CAUGHT, None, (), alpha
+            return CAUGHT, None, (), alpha, None, ()
+        fine, laid = self.atlases.relief(material), ()
+        if fine is not None and reliefs is not None:
+            laid = tuple(reliefs.laid[material].tolist())
         if own == CONSTANT:
-            return own, None, (), alpha
-        return own, self.atlases[material], tuple(maps.uv_map[material].tolist()), alpha
+            return own, None, (), alpha, fine, laid
+        return own, self.atlases[material], tuple(maps.uv_map[material].tolist()), alpha, fine, laid
 
     def _indices(self, faces: U32) -> Any:
         flat = np.ascontiguousarray(faces, np.uint32).reshape(-1)
@@ -235,6 +244,10 @@ class GlScene:
             wanted.append((body.slope, record[:, 3:6]))
         if GENERAL in kinds:
             wanted += [(body.sums[k], sums[:, 3 * k : 3 * k + 3]) for k in range(sums.shape[1] // 3)]
+        if colours.bend is not None and any(batch.relief for batch in body.batches):
+            bend = colours.bend[own]
+            parts = 6 if AFFINE in kinds else 4 if GENERAL in kinds else 3
+            wanted += [(body.bends[k], bend[:, 3 * k : 3 * k + 3]) for k in range(parts)]
         known, shown = picture.radiance.valid[own], colours.shown[own]
         if not shown.all():  # what is turned away is black; who turns the view wants to see something better
             lit = shown.copy()

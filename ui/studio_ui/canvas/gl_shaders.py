@@ -7,6 +7,8 @@ written, so that half floats keep their precision where the display shows it.
 from __future__ import annotations
 
 from studio_core.kernels.compose import AFFINE, CAUGHT, GENERAL
+from studio_core.kernels.relief import DARK
+from studio_ui.canvas.gl_map_shaders import MAPS
 from studio_ui.canvas.gl_sky_shaders import SKY
 from studio_ui.canvas.grid import LIFT, REACH, STEPS, WIDE
 
@@ -29,6 +31,26 @@ varying vec3 v_slope;
 EACH attribute vec3 a_sum@;
 EACH varying vec3 v_sum@;
 #endif
+#ifdef RELIEF
+attribute vec3 a_bend0;
+attribute vec3 a_bend1;
+attribute vec3 a_bend2;
+varying vec3 v_bend0;
+varying vec3 v_bend1;
+varying vec3 v_bend2;
+#ifdef AFFINE
+attribute vec3 a_bend3;
+attribute vec3 a_bend4;
+attribute vec3 a_bend5;
+varying vec3 v_bend3;
+varying vec3 v_bend4;
+varying vec3 v_bend5;
+#endif
+#ifdef GENERAL
+attribute vec3 a_bend3;
+varying vec3 v_bend3;
+#endif
+#endif
 uniform mat4 u_eye_from_model;
 uniform mat4 u_projection;
 varying vec3 v_eye;
@@ -47,62 +69,20 @@ void main() {
 #ifdef GENERAL
 EACH    v_sum@ = a_sum@;
 #endif
+#ifdef RELIEF
+    v_bend0 = a_bend0;
+    v_bend1 = a_bend1;
+    v_bend2 = a_bend2;
+#ifdef AFFINE
+    v_bend3 = a_bend3;
+    v_bend4 = a_bend4;
+    v_bend5 = a_bend5;
+#endif
+#ifdef GENERAL
+    v_bend3 = a_bend3;
+#endif
+#endif
     gl_Position = u_projection * vec4(v_eye, 1.0);
-}
-"""
-
-_MAPS = """
-uniform vec3 u_uv_u;           // place in the picture: two rows on (u, v, 1)
-uniform vec3 u_uv_v;
-uniform vec2 u_finest;         // size of the finest level, texels
-uniform float u_levels;
-uniform vec2 u_atlas;          // size
-uniform float u_pixel_angle;
-
-float repeated(vec2 uv, vec3 row) {
-    float made = uv.x * row.x + uv.y * row.y + row.z;
-    return made - floor(made);
-}
-
-// Left, top, width and height of a level in the atlas.
-vec4 place_of(float level) {
-    vec2 size = u_finest;
-    float top = 0.0;
-    for (int k = 0; k < LEVELS; k++) {
-        if (float(k) >= level) break;
-        if (k > 0) top += size.y;
-        size = max(floor(0.5 * size), 1.0);
-    }
-    return vec4(level > 0.5 ? u_finest.x : 0.0, top, size);
-}
-
-// The mip level whose texels are about as large as a pixel; density is that of the face, from derivatives.
-vec4 map_level(vec2 uv) {
-    vec3 across = dFdx(v_eye), down = dFdy(v_eye);
-    vec3 normal = cross(across, down);
-    float area = max(length(normal), 1e-30);
-    vec2 du = dFdx(uv), dv = dFdy(uv);
-    float laid = abs(u_uv_u.x * u_uv_v.y - u_uv_u.y * u_uv_v.x);
-    float in_map = abs(du.x * dv.y - du.y * dv.x) * laid * u_finest.x * u_finest.y;
-    float away = max(length(v_eye), 1e-30);
-    float cosine = max(abs(dot(normal, v_eye)) / (area * away), 0.05);
-    float footprint = away * u_pixel_angle * sqrt(in_map / area) / sqrt(cosine);
-    float level = clamp(floor(log2(max(footprint, 1e-6)) + 0.5), 0.0, u_levels - 1.0);
-    return place_of(level);
-}
-
-vec3 texel(sampler2D map, vec4 level, vec2 uv) {
-    vec2 at = vec2(repeated(uv, u_uv_u), repeated(uv, u_uv_v));
-    vec2 place = at * level.zw - 0.5;
-    vec2 low = floor(place), part = place - low;
-    vec2 high = low + 1.0;
-    low = mix(low, low + level.zw, vec2(lessThan(low, vec2(0.0))));
-    high = mix(high, high - level.zw, vec2(greaterThanEqual(high, level.zw)));
-    low = (low + level.xy + 0.5) / u_atlas;
-    high = (high + level.xy + 0.5) / u_atlas;
-    vec3 a = texture2D(map, low).rgb, b = texture2D(map, vec2(high.x, low.y)).rgb;
-    vec3 c = texture2D(map, vec2(low.x, high.y)).rgb, d = texture2D(map, high).rgb;
-    return mix(mix(a, b, part.x), mix(c, d, part.x), part.y);
 }
 """
 
@@ -120,7 +100,7 @@ uniform float u_opacity;
 #ifdef MAPPED
 varying vec2 v_uv;
 """
-    + _MAPS
+    + MAPS
     + """
 #endif
 #ifdef SLOPED
@@ -143,18 +123,32 @@ EACH uniform sampler2D u_map@;
 
 void main() {
     vec3 light = v_plain;
-#ifdef MAPPED
-    vec4 level = map_level(v_uv);
+#if defined(AFFINE) || defined(GENERAL)
+    vec4 level = map_level(v_uv, u_uv_u, u_uv_v, u_sizes.xy, u_levels);
 #endif
 #ifdef AFFINE
-    light += texel(u_map0, level, v_uv) * v_slope;
+    vec3 found = texel(u_map0, level, v_uv, u_uv_u, u_uv_v, u_sizes.zw);
+    light += found * v_slope;
 #endif
 #ifdef CAUGHT
     light += sky(u_turn * v_eye + u_from) * v_slope;
 #endif
 #ifdef GENERAL
-EACH    light += texel(u_map@, level, v_uv) * v_sum@;
+EACH    light += texel(u_map@, level, v_uv, u_uv_u, u_uv_v, u_sizes.zw) * v_sum@;
     light = max(light, 0.0);  // captured materials have coefficients below 0
+#endif
+#ifdef RELIEF
+    vec4 fine = map_level(v_uv, u_relief_uv_u, u_relief_uv_v, u_relief_sizes.xy, u_relief_levels);
+    vec3 n = texel(u_relief, fine, v_uv, u_relief_uv_u, u_relief_uv_v, u_relief_sizes.zw);
+    n.xy = vec2(dot(u_relief_turn.xy, n.xy), dot(u_relief_turn.zw, n.xy));
+    vec3 more = n.x * v_bend0 + n.y * v_bend1 + n.z * v_bend2;
+#ifdef AFFINE
+    more += found * (n.x * v_bend3 + n.y * v_bend4 + n.z * v_bend5);
+#endif
+#ifdef GENERAL
+    more *= mix(vec3(0.0), light / max(v_bend3, DARK), vec3(greaterThan(v_bend3, vec3(DARK))));
+#endif
+    light = max(light + more, 0.0);
 #endif
     float away = length(v_eye);
 #ifdef PEELED
@@ -338,14 +332,17 @@ def display_program() -> tuple[str, str]:
     return SCREEN_VERTEX.strip(), _defined(source, defines)
 
 
-def mesh_program(kind: int, peeled: bool, levels: int, terms: int = 3) -> tuple[str, str]:
+def mesh_program(
+    kind: int, peeled: bool, levels: int, terms: int = 3, relief: bool = False
+) -> tuple[str, str]:
     """Vertex and fragment shader for surfaces whose coefficients are of a kind of `kernels.compose`.
 
-    `terms`: how many those with a map of their own have.
+    `terms`: how many those with a map of their own have; `relief`: with a normal map.
     """
-    names = ["LIT", *_NAMES.get(kind, ())]
-    names += ["PEELED"] if peeled else []
-    defines = "".join(f"#define {name}\n" for name in names) + f"#define LEVELS {levels}\n"
+    more = (("PEELED",) if peeled else ()) + (("MAPPED", "RELIEF") if relief else ())
+    names = dict.fromkeys(("LIT", *_NAMES.get(kind, ()), *more))
+    defines = "".join(f"#define {name}\n" for name in names)
+    defines += f"#define LEVELS {levels}\n#define DARK {DARK:e}\n"
     vertex, fragment = (_for_each(source, terms) for source in (MESH_VERTEX, MESH_FRAGMENT))
     return _defined(vertex, defines), _defined(fragment, defines)
 
