@@ -12,7 +12,12 @@ from studio.bench.harness import Report
 from studio.headless import Headless
 
 IN_PARTS = True
-PARTS = ("studio.bench.materials_energy", "studio.bench.materials_captured", "studio.bench.materials_btf")
+PARTS = (
+    "studio.bench.materials_energy",
+    "studio.bench.materials_normals",
+    "studio.bench.materials_captured",
+    "studio.bench.materials_btf",
+)
 
 
 def run(report: Report, program: Headless) -> None:

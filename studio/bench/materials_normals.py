@@ -1,29 +1,32 @@
-"""The part of `lucarne bench materials` about normal maps: a floor with each, cases `normals NAME on KIND`.
+"""The part of `lucarne bench materials` about normal maps: a floor with each, cases `normals/NAME/KIND`.
 
-`flat_error` is the relative RMSE of the picture without the map, `error` with it, against each place's own
-normal, by `ErrorMeter`; `sum_cost_ratio` and `pixel_cost_ratio` are what light sums and pixels cost with it
-over what they cost without.
+`normal_flat_error` is the relative RMSE of the picture without the map, `normal_error` with it, against each
+place's own normal, by `ErrorMeter`. `sum_cost_ratio`, `pixel_cost_ratio` and `shader_cost_ratio` are what
+light sums, pixels and OpenGL's drawing cost with a map over what they cost without, where all of the floor
+has one.
 """
 
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
+import time
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from studio.bench.harness import Report
+from studio.bench.harness import Report, Timing
 from studio.headless import Headless
 from studio_core.arrays import frozen_map
 from studio_core.contract import Services
 from studio_core.raster import PictureStage
-from studio_core.scene.diff import everything
+from studio_core.scene.diff import everything, view_changed
 from studio_core.scene.geometry import Geometry, Image, Texture
 from studio_core.scene.nodes import Camera, Environment, Material, MeshObject, PointLamp, Scene
 from studio_core.scene.transform import Transform, looking
-from studio_core.shading.artifacts import Error
+from studio_core.session import View
+from studio_core.shading.artifacts import Error, Picture
 from studio_core.shading.error_meter import ErrorMeter
 from studio_core.shading.frame import Frame
 from studio_core.shading.job import Job
@@ -36,9 +39,9 @@ F64 = npt.NDArray[np.float64]
 TEXELS = 64
 REPEATS = 4
 WIDTH, HEIGHT = 480, 270
+PIXELS = (900, 600)
 PLACES = 1500
 VERTICES = 20_000
-FLAT = Image(np.full((1, 1, 3), (128, 128, 255), np.uint8), "data")
 
 
 def of_heights(heights: F64) -> Image:
@@ -76,10 +79,10 @@ def pictures() -> dict[str, Image]:
 
 KINDS: Mapping[str, tuple[str, Mapping[str, Any]]] = {
     "matte": ("lambert", {"base_color": (0.6, 0.5, 0.4)}),
-    "plastic 0.6": ("ggx", {"base_color": (0.5, 0.1, 0.1), "roughness": 0.6}),
-    "plastic 0.4": ("ggx", {"base_color": (0.5, 0.1, 0.1), "roughness": 0.4}),
-    "metal 0.6": ("ggx", {"base_color": (0.9, 0.7, 0.4), "roughness": 0.6, "metallic": 1.0}),
-    "metal 0.4": ("ggx", {"base_color": (0.9, 0.7, 0.4), "roughness": 0.4, "metallic": 1.0}),
+    "plastic-0.6": ("ggx", {"base_color": (0.5, 0.1, 0.1), "roughness": 0.6}),
+    "plastic-0.4": ("ggx", {"base_color": (0.5, 0.1, 0.1), "roughness": 0.4}),
+    "metal-0.6": ("ggx", {"base_color": (0.9, 0.7, 0.4), "roughness": 0.6, "metallic": 1.0}),
+    "metal-0.4": ("ggx", {"base_color": (0.9, 0.7, 0.4), "roughness": 0.4, "metallic": 1.0}),
 }
 
 
@@ -132,16 +135,16 @@ def _sky() -> Image:
 
 
 def run(report: Report, program: Headless) -> None:
-    """Rows `normals NAME on KIND`."""
+    """Rows `normals/NAME/KIND`, and `normals/cost`."""
     for name, image in pictures().items():
         for kind in KINDS:
-            case = f"normals {name} on {kind}"
-            if not report.wants(case) or (report.quick and (name, kind) != ("bricks", "plastic 0.4")):
+            case = f"normals/{name}/{kind}"
+            if not report.wants(case) or (report.quick and (name, kind) != ("bricks", "plastic-0.4")):
                 continue
             flat, mapped = measured(program.services, kind, image)
-            report.add(case, "flat_error", flat.relative_rmse, "ratio", flat.uncertainty)
-            report.add(case, "error", mapped.relative_rmse, "ratio", mapped.uncertainty)
-    case = "normals cost"
+            report.add(case, "normal_flat_error", flat.relative_rmse, "ratio", flat.uncertainty)
+            report.add(case, "normal_error", mapped.relative_rmse, "ratio", mapped.uncertainty)
+    case = "normals/cost"
     if report.wants(case):
         for metric, (value, spread) in costs(program.services, 1 if report.quick else 9).items():
             report.add(case, metric, value, "ratio", spread)
@@ -172,5 +175,54 @@ def shaded(services: Services, scene: Scene, name: str = "cuts") -> tuple[Pipeli
 
 
 def costs(services: Services, repeats: int) -> dict[str, tuple[float, float]]:
-    """What light sums and pixels cost with a map over what they cost without, and how sure that is."""
-    raise NotImplementedError
+    """What light sums and pixels cost with a map over what they cost without, and how sure that is.
+
+    The eye moves a little, in turn in front of both, so that what slows the machine slows both.
+    """
+    image = pictures()["bricks"]
+    both = [shaded(services, floor_scene("plastic-0.4", shown)) for shown in (None, image)]
+    taken: dict[str, list[float]] = {"sum_cost_ratio": [], "pixel_cost_ratio": []}
+    for step in range(1, repeats + 1):
+        seconds = []
+        for number, (pipeline, frame) in enumerate(both):
+            aside = Transform((0.002 * step, 0.0, 0.0)) @ frame.view.transform
+            view = dataclasses.replace(frame.view, transform=aside)
+            both[number] = pipeline, dataclasses.replace(frame, view=view, revision=frame.revision + 1)
+            pipeline.update(both[number][1], view_changed(), Job("looking aside"))
+            ran = {run.name: run.seconds for run in pipeline.report if run.round == 0}
+            seconds.append((ran["RadianceStage"], ran["PictureStage"]))
+        for name, without, mapped in zip(taken, *seconds, strict=True):
+            taken[name].append(mapped / without)
+    made = {name: Timing.of(ratios) for name, ratios in taken.items()}
+    found = {name: (ratio.median, ratio.spread) for name, ratio in made.items()}
+    drawn = _drawn([pipeline.artifact(Picture) for pipeline, _ in both], both[0][1].view, repeats)
+    return found if drawn is None else {**found, "shader_cost_ratio": drawn}
+
+
+def _drawn(shown: Sequence[Any], view: View, repeats: int) -> tuple[float, float] | None:
+    """The same of drawing by OpenGL, where there is one."""
+    try:
+        from studio_ui.canvas.gl_context import Offscreen
+        from studio_ui.canvas.gl_renderer import Look
+
+        screen = Offscreen()
+    except Exception:
+        return None
+    look = Look(dataclasses.replace(view, width=PIXELS[0], height=PIXELS[1]))
+    ratios = []
+    try:
+        with screen.target(*PIXELS):
+            for _ in range(repeats + 1):
+                seconds = []
+                for picture in shown:
+                    screen.renderer.show(picture)
+                    screen.finish()
+                    begun = time.perf_counter()
+                    screen.renderer.draw(look)
+                    screen.finish()
+                    seconds.append(time.perf_counter() - begun)
+                ratios.append(seconds[1] / seconds[0])
+    finally:
+        screen.close()
+    ratio = Timing.of(ratios[1:])
+    return ratio.median, ratio.spread

@@ -30,7 +30,7 @@ class Painter:
         lights = {light.id: light for light in scene.of(Light) if scene.shown(light.id)}
         self.mesh, self.view, self.surfaces = radiance.surfaces.mesh, hits.view, radiance.surfaces
         self.terms = radiance.combined(lights).astype(np.float64)
-        self.maps, self.uv = [], []
+        self.maps, self.uv, self.own_map = [], [], []
         for name in radiance.surfaces.materials:
             resolved = resolve(scene.material(name), registry)
             base = coefficients(resolved, radiance.width).astype(np.float64)[None, None]
@@ -40,8 +40,20 @@ class Painter:
             while max(levels[-1].shape[:2]) > 1 and len(levels) < 12:
                 levels.append(halved(levels[-1]))
             self.maps.append(levels)
+            self.own_map.append(len(resolved.textures) > 1 or resolved.brdf.id == "phong")
             texture = next(iter(resolved.textures.values()), None)
             self.uv.append(place_in_picture(texture) if texture else np.eye(3))
+        self.tilts, self.bumps = None, []
+        if all(layer.tilts is not None for layer in radiance.layers.values()):
+            self.tilts = sum(
+                layer.tilts.astype(np.float64) * np.array(lights[node].gain())
+                for node, layer in radiance.layers.items()
+                if node in lights
+            )
+        for name in radiance.surfaces.materials:
+            material = scene.material(name)
+            texture = None if material.catches else material.textures.get("normal")
+            self.bumps.append(texture and bumps(texture, material.values.get("normal", 1.0)))
         sky = shown_environment(scene)
         self.sky = sky if sky is not None and sky.background else None
         self.sky_pixels = linear_rgb(self.sky.image).astype(np.float64) if self.sky else None
@@ -96,22 +108,37 @@ class Painter:
                 corners = mesh.back_faces[face]
             met = np.array(self.view.transform.translation) + float(hits.distance[index]) * along
             return self.photograph(along, met) * (weights @ self.lit[corners]), None
-        levels, place = self.maps[m], self.uv[m]
         footprint = None
-        if len(levels) == 1:
-            look = levels[0][0, 0]
-        else:
+
+        def read(levels, place):
             uv = (place @ (*(weights @ mesh.uvs[corners].astype(np.float64)), 1))[:2]
             e, f = mesh.uvs[corners[1:]].astype(np.float64) - mesh.uvs[corners[0]]
             laid = abs(np.linalg.det(place[:2, :2]))
             texels = abs(e[0] * f[1] - e[1] * f[0]) * laid * np.prod(levels[0].shape[:2])
             angle = 2 * np.tan(np.radians(self.view.fov) / 2) / (self.view.height * self.view.antialias)
-            footprint = hits.distance[index] * angle * np.sqrt(texels / size) / np.sqrt(max(abs(away), 0.05))
-            level = int(np.clip(np.floor(np.log2(footprint) + 0.5), 0, len(levels) - 1))
-            look = bilinear_repeat(levels[level], *(uv - np.floor(uv)))
+            covered = hits.distance[index] * angle * np.sqrt(texels / size) / np.sqrt(max(abs(away), 0.05))
+            level = int(np.clip(np.floor(np.log2(covered) + 0.5), 0, len(levels) - 1))
+            return bilinear_repeat(levels[level], *(uv - np.floor(uv))), covered
+
+        look = self.maps[m][0][0, 0]
+        if len(self.maps[m]) > 1:
+            look, footprint = read(self.maps[m], self.uv[m])
+        normal = None
+        if self.tilts is not None and self.bumps[m] is not None:
+            normal, covered = read(*self.bumps[m])
+            footprint = covered if footprint is None else (footprint, covered)
         if away > 0 and mesh.back_faces[face, 0] != NO_BACK:
             corners = mesh.back_faces[face]
         colour = (look * np.einsum("k,ktc->tc", weights, self.terms[corners])).sum(axis=0)
+        if normal is not None:
+            turned = np.tensordot(normal, np.einsum("k,kftc->ftc", weights, self.tilts[corners]), 1)
+            if self.own_map[m]:
+                usual = self.maps[m][-1].mean(axis=(0, 1))
+                light = np.einsum("k,ktc->tc", weights, self.terms[corners])
+                colour = colour * (1 + (usual * turned).sum(axis=0) / (usual * light).sum(axis=0))
+            else:
+                colour = colour + (look * turned).sum(axis=0)
+            colour = np.maximum(colour, 0)
         for inside, rest in hits.behind:
             for at in np.flatnonzero(inside == index):
                 alpha = float(self.surfaces.opacity[mesh.face_material[face]])
@@ -129,6 +156,21 @@ def place_in_picture(texture):
     return size @ back @ np.diag([1, texture.aspect, 1])
 
 
+def bumps(texture, strength):
+    """Levels of (x, y, 1 − z) on the surface, and the place in the picture."""
+    n = texture.image.pixels.astype(np.float64)[::-1] / 127.5 - 1
+    n[..., 2] = np.maximum(n[..., 2], 0.05)
+    n[..., :2] *= strength
+    n /= np.linalg.norm(n, axis=2, keepdims=True)
+    lies = (n[..., 0] * np.sign(texture.scale[0]) + 1j * n[..., 1] * np.sign(texture.scale[1])) * np.exp(
+        1j * np.radians(texture.rotation)
+    )
+    levels = [np.stack([lies.real, lies.imag, 1 - n[..., 2]], axis=2)]
+    while max(levels[-1].shape[:2]) > 1 and len(levels) < 12:
+        levels.append(halved(levels[-1]))
+    return levels, place_in_picture(texture)
+
+
 def on_dome(eye, along, radius):
     """Where a ray from inside a dome about the origin meets its floor or the dome itself, by bisection."""
 
@@ -143,6 +185,12 @@ def on_dome(eye, along, radius):
     return eye + low * along
 
 
+def doubtful(footprint):
+    """Whether rounding may decide between two levels of a map; footprints of none, one or two maps."""
+    steps = [np.log2(max(f, 1e-9)) + 0.5 for f in np.atleast_1d([] if footprint is None else footprint)]
+    return any(abs(step - np.round(step)) < 1e-4 for step in steps)
+
+
 def picture(scene, radiance, hits, registry) -> tuple[Array, npt.NDArray[np.bool_]]:
     """(H, W, 3), and the pixels (H, W) where rounding may decide between two levels of a map."""
     painter, n2 = Painter(scene, radiance, hits, registry), hits.samples**2
@@ -151,15 +199,12 @@ def picture(scene, radiance, hits, registry) -> tuple[Array, npt.NDArray[np.bool
     for sample in range(len(hits.face)):
         colour, footprint = painter.sample(hits, sample, sample)
         out[sample // n2] += colour / n2
-        if footprint is not None:
-            step = np.log2(max(footprint, 1e-9)) + 0.5
-            unsure[sample // n2] |= abs(step - np.round(step)) < 1e-4
+        unsure[sample // n2] |= doubtful(footprint)
     if hits.edges is not None:
         finer, fine = Painter(scene, radiance, hits.edges.hits, registry), hits.edges.hits
         count = len(fine.face) // max(len(hits.edges.pixels), 1)
         for row, pixel in enumerate(hits.edges.pixels):
             colours = [finer.sample(fine, row * count + k, pixel * count + k) for k in range(count)]
             out[pixel] = np.mean([colour for colour, _ in colours], axis=0)
-            steps = [np.log2(max(f, 1e-9)) + 0.5 for _, f in colours if f is not None]
-            unsure[pixel] = any(abs(step - np.round(step)) < 1e-4 for step in steps)
+            unsure[pixel] = any(doubtful(footprint) for _, footprint in colours)
     return out.reshape(view.height, view.width, 3), unsure.reshape(view.height, view.width)

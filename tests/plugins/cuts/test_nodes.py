@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import dataclasses
+from functools import partial
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from oracles import cuts as oracle
+from oracles import tilted
 from oracles.radiance import view_direction
 
 from studio_core.kernels.radiance import frame
@@ -89,6 +93,38 @@ def shaded(table, mesh, shapes, wanted, workers):
     out = np.zeros((len(mesh.positions), TERMS, 3), np.float32)
     looked = table.shade(mesh, shapes[0], EYE, wanted, out, workers, Job("test"))
     return out, looked
+
+
+@pytest.mark.parametrize("slope", [0.05, 0.5, 1.0])
+def test_leaning_normals_are_summed_as_by_the_oracle(shapes, workers, slope):
+    """Terms are as without, tilts the oracle's differences; materials without a slope have none."""
+    rng = np.random.default_rng(7)
+    count = 12
+    mesh, table, wanted = points_of(rng, count), NodeTable(count), rng.random(count) < 0.8
+    block = block_of(rng, range(count))
+    table.replace([block])
+    tilt = np.array([slope, slope, 0.0], np.float32)
+    leaning = dataclasses.replace(shapes[0], tilt=tilt)
+    found, tilts = np.zeros((count, TERMS, 3), np.float32), np.zeros((count, 3, TERMS, 3), np.float32)
+    looked = table.shade(mesh, leaning, EYE, wanted, found, workers, Job("test"), tilts)
+    plain, before = shaded(table, mesh, shapes, wanted, workers)
+    np.testing.assert_array_equal(found, plain)
+    of_leaning = sum(len(nodes_of(block, p)) for p in range(count) if wanted[p] and tilt[mesh.material[p]])
+    assert looked == before + 4 * of_leaning > before
+    axes = np.zeros((3, 3))
+    for p in range(count):
+        m = mesh.material[p]
+        nodes = nodes_of(block, p)
+        if not wanted[p] or tilt[m] == 0 or not len(nodes):
+            assert not tilts[p].any()
+            continue
+        frame(*mesh.normals[p].astype(np.float64), axes)
+        to_eye = axes @ (EYE - mesh.positions[p]).astype(np.float64)
+        to_eye /= np.linalg.norm(to_eye)
+        given_of = (shapes[1][m], shapes[2][m], to_eye, nodes)
+        expected = tilted.tilts(partial(tilted.leaning_sum, *given_of), slope)
+        scale = np.abs(expected).max() + np.abs(found[p]).max() / slope**2
+        np.testing.assert_allclose(tilts[p, :, : shapes[1][m].terms], expected, rtol=2e-3, atol=2e-5 * scale)
 
 
 @given(st.integers(0, 2**32 - 1))
