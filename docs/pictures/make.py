@@ -1,9 +1,9 @@
-"""Makes the pictures of these pages: `python docs/pictures/make.py room | windows | chair | capture`.
+"""Makes the pictures of these pages: `python docs/pictures/make.py NAME`.
 
 `room` renders the sample room, `windows` photographs the window when it has come to rest (both themes, 100
 and 150 %; `window THEME PERCENT` makes one of them), `chair` drags a chair through the settled room as a hand
 does and lets it rest, exact and refined. `capture` has the simulated phone photograph the sample room and the
-capture panel make its light of that.
+capture panel make its light of that. `library` shows the library of materials in both themes.
 """
 
 from __future__ import annotations
@@ -16,8 +16,12 @@ import tempfile
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
+
+if TYPE_CHECKING:
+    from PySide6.QtWidgets import QApplication
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
@@ -31,6 +35,7 @@ WAY = ((0.0, 0.0), (1.55, 0.55))  # of the chair over the floor, metres in x and
 SETTLED = 180  # seconds that a window may take to come to rest
 PHONE_AT = (0.7, 1.3, 0.6)  # where the phone is held in the sample room, metres
 FACE, PANEL = 512, (1280, 800)  # pixels of a side of the room's cube, and of the capture panel
+LIBRARY = (430, 760)
 STEPS_SHOWN = ("reflections", "join")
 
 
@@ -238,6 +243,57 @@ def capture() -> None:
     studio.close()
 
 
+def library() -> None:
+    """The library as a person finds it, dark beside light."""
+    os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
+    os.environ["LUCARNE_STATE"] = tempfile.mkdtemp(prefix="lucarne-pictures-")
+    os.environ["LUCARNE_MATERIALS"] = tempfile.mkdtemp(prefix="lucarne-materials-")
+    from PIL import Image
+    from PySide6.QtWidgets import QApplication
+
+    application = QApplication(sys.argv[:1])
+    both = [shelf(application, theme) for theme in ("dark", "light")]
+    Image.fromarray(np.hstack(both)).save(HERE / "library.webp", quality=88, method=6)
+
+
+def shelf(application: QApplication, theme: str) -> np.ndarray:
+    """The library's panel, with a material of the sample room kept in it."""
+    from PySide6.QtGui import QImage
+
+    from studio.app import assemble
+    from studio.samples import sample
+    from studio_ui.settings import Settings, state_folder
+
+    settings = Settings(state_folder())
+    settings.set("theme", theme)
+    studio = assemble(settings=settings)
+    panel, dock = studio.window.panels["library"], studio.window.docks["library"]
+    until = time.monotonic() + SETTLED
+
+    def wait(for_what: Callable[[], bool]) -> None:
+        while not for_what():
+            if time.monotonic() > until:
+                raise SystemExit("the library was not drawn")
+            application.processEvents()
+            time.sleep(0.01)
+
+    studio.window.show()
+    studio.window.files.open_copy(sample())
+    wait(lambda: bool(studio.context.document.scene.materials))
+    panel.keep(tuple(m.id for m in studio.context.document.scene.materials.values() if m.name == "Woven rug"))
+    dock.setFloating(True)
+    dock.resize(*LIBRARY)
+    dock.show()
+    work, rest = studio.window.panels["materials"].work, time.monotonic() + 2
+    wait(lambda: studio.context.warm and bool(panel.view.entries) and time.monotonic() > rest)
+    wait(lambda: not work.busy)
+    shown = panel.grab().toImage().convertToFormat(QImage.Format.Format_RGB888)
+    rows = np.frombuffer(shown.constBits(), np.uint8).reshape(shown.height(), shown.bytesPerLine())
+    studio.close()
+    return rows[:, : 3 * shown.width()].reshape(shown.height(), shown.width(), 3).copy()
+
+
 if __name__ == "__main__":
     makers = {"room": room, "windows": windows, "window": window, "chair": chair, "capture": capture}
+    makers |= {"library": library}
     makers[sys.argv[1]](*sys.argv[2:])

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from PySide6.QtCore import QPoint, QRect, QSize, Qt, QTimer
+from PySide6.QtCore import QModelIndex, QPoint, QRect, QSize, Qt, QTimer
 from PySide6.QtGui import QDrag, QDragMoveEvent, QDropEvent, QIcon, QKeyEvent, QResizeEvent
 from PySide6.QtWidgets import QAbstractItemView, QListView
 
@@ -91,7 +91,14 @@ class LibraryView(QListView):
         if found:
             selection.setCurrentIndex(found[-1], selection.SelectionFlag.NoUpdate)
             if scroll:
+                self.scrollTo(self._heading(found[-1].row()))
                 self.scrollTo(found[-1])
+
+    def _heading(self, number: int) -> QModelIndex:
+        """The heading over a material in the first row below it; else the material itself."""
+        near = range(number - 1, max(number - self.cells.columns, 0) - 1, -1)
+        above = next((i for i in near if self.rows.rows[i].title), number)
+        return self.rows.index(above)
 
     def choose_first(self) -> None:
         """The first material, as the keys do that lead here from the search."""
