@@ -49,6 +49,7 @@ GROUPS: dict[str, tuple[str, ...]] = {
             "assign",
             "replace_material",
             "lay_pattern",
+            "grow_pattern",
             "remove",
         ),
         *("add_model", "light_from", "apply", "undo", "redo"),

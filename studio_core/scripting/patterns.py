@@ -1,21 +1,26 @@
-"""What scripts do to patterns: lay the pictures of a material by their size in metres, and turn them."""
+"""What scripts do to patterns: lay the pictures of a material by size, turn them, make larger ones."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from studio_core.document import Document
-from studio_core.edits import Compound, LayTextures
+from studio_core.edits import Compound, LayTextures, SetTexture
 from studio_core.errors import EditError
+from studio_core.scene.geometry import Texture
 from studio_core.scene.nodes import Material, Scene
 from studio_core.scene.pattern import PLAIN, PatternRuler, pattern_size, with_rotation, with_size
+from studio_core.shading.grown_textures import grown, lying_alike
+from studio_core.shading.job import Job
 
 
 class Patterns(ABC):
     """Part of the names that scripts have; each call is one entry of the history."""
 
     _document: Document
+    _run: Callable[[str, Callable[[Job], Any]], Any]
 
     @property
     @abstractmethod
@@ -52,3 +57,24 @@ class Patterns(ABC):
             laid = (made.scale, made.offset, made.rotation, made.aspect)
             edits.append(LayTextures(found.id, *laid, (name,)))
         self._document.apply(Compound(f"Pattern of {found.name}", tuple(edits)))
+
+    def grow_pattern(self, material: Any, times: float = 4.0, seed: int = 0) -> None:
+        """Make the pictures of a material `times` as wide and high without a seam and without repetition.
+
+        Their texels stay as large on the objects; another `seed` is another arrangement.
+        """
+        found = self.material(material)
+        edits: list[SetTexture] = []
+        left = dict(found.textures)
+        while left:
+            alike = lying_alike(left, next(iter(left)))
+
+            def work(job: Job, alike: Mapping[str, Texture] = alike) -> dict[str, Texture]:
+                return grown(alike, times, seed=seed, job=job)
+
+            made = self._run(f"Growing the pattern of {found.name}", work)
+            edits += [SetTexture(found.id, name, one) for name, one in made.items()]
+            left = {name: one for name, one in left.items() if name not in alike}
+        if not edits:
+            raise EditError(f"{found.name!r} has no pictures")
+        self._document.apply(Compound(f"Larger pattern of {found.name}", tuple(edits)))

@@ -348,3 +348,21 @@ def test_maps_of_a_captured_material_are_one_row(make: Make) -> None:
     driver.document.apply(AddMaterial(Material(id="plain", name="Plain", model="captured")))
     choose(driver, "plain")
     assert form.maps.text.text() == "No pictures: every spot is alike"
+
+
+def test_a_pattern_is_grown_for_large_surfaces(driver: Driver) -> None:
+    sample = np.random.default_rng(0).random((32, 32, 3)).astype(np.float32)
+    driver.document.apply(SetTexture("red", "base_color", Texture(Image(sample))))
+    row = choose(driver, "red").editor.textures["base_color"]
+    driver.until(lambda: row.text.text() == "32 × 32")
+    assert row.grow.larger[8].isEnabled()
+    row.grow.larger[2].trigger()
+    driver.until(lambda: row.text.text() == "64 × 64")
+    assert driver.document.scene.material("red").textures["base_color"].scale == (0.5, 0.5)
+    assert driver.labels()[-1] == "Larger pattern of Red"
+    driver.document.undo()
+    driver.until(lambda: row.text.text() == "32 × 32")
+    driver.document.apply(SetTexture("red", "base_color", Texture(Image(np.zeros((1024, 8, 3), np.float32)))))
+    driver.until(lambda: row.text.text() == "8 × 1024")
+    assert row.grow.larger[4].isEnabled()
+    assert not row.grow.larger[8].isEnabled()

@@ -6,6 +6,7 @@ import dataclasses
 
 import numpy as np
 import pytest
+from oracles.patterns import marble
 from scenes import floor
 
 from studio_core.contract import Services
@@ -56,3 +57,18 @@ def test_what_cannot_be_laid_is_said(names):
     names.apply(names.namespace["SetTexture"]("oak", "base_color", flat))
     with pytest.raises(EditError, match="cannot be"):
         names.lay_pattern("Oak", size=0.5)
+
+
+def test_a_pattern_is_grown(names):
+    sample = Image(marble(40))
+    textures = {"base_color": Texture(sample), "roughness": Texture(sample, (2.0, 2.0))}
+    names.apply(names.namespace["SetTexture"]("oak", "base_color", textures["base_color"]))
+    names.apply(names.namespace["SetTexture"]("oak", "roughness", textures["roughness"]))
+    names.grow_pattern("Oak", times=1.5)
+    made = names.material("Oak").textures
+    assert {one.image.pixels.shape for one in made.values()} == {(60, 60, 3)}
+    assert made["base_color"].scale == pytest.approx((2 / 3, 2 / 3))
+    assert made["roughness"].scale == pytest.approx((4 / 3, 4 / 3))
+    assert len(names._document.history) == 4
+    with pytest.raises(EditError, match="no pictures"):
+        names.grow_pattern("Plain")

@@ -8,6 +8,7 @@ from PySide6.QtWidgets import QLabel, QToolButton, QVBoxLayout, QWidget
 
 from studio_core.scene.geometry import Image, Texture
 from studio_core.scene.pattern import UnitLengths
+from studio_ui.panels.grow_button import GrowButton
 from studio_ui.panels.panel import row
 from studio_ui.panels.pattern_row import PatternRow
 from studio_ui.panels.texture_row import small_pixmap
@@ -16,7 +17,7 @@ from studio_ui.panels.texture_row import small_pixmap
 class MapsRow(QWidget):
     """`lay(name, texture)` is an edit of all maps that lie as this one does; `names` is their order.
 
-    `pattern` is for whoever makes the row to put below.
+    `grow(name, times)` makes these larger. `pattern` is for whoever makes the row to put below.
     """
 
     def __init__(
@@ -24,6 +25,7 @@ class MapsRow(QWidget):
         names: tuple[str, ...],
         tool: Callable[[str, str], QToolButton],
         lay: Callable[[str, Texture], object],
+        grow: Callable[[str, int], object],
     ) -> None:
         super().__init__()
         self._names = names
@@ -34,10 +36,11 @@ class MapsRow(QWidget):
         self.text.setProperty("role", "dim")
         self.text.setWordWrap(True)
         self.pattern = PatternRow(tool, lambda texture: lay(self.first, texture))
+        self.grow = GrowButton(tool, lambda times: grow(self.first, times))
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)
         column.setSpacing(2)
-        column.addLayout(row(self.picture, self.text, stretch=1))
+        column.addLayout(row(self.picture, self.text, self.grow.button, stretch=1))
 
     def show_maps(self, textures: Mapping[str, Texture], lengths: UnitLengths | None) -> None:
         """What lies there now, on surfaces with such lengths."""
@@ -49,6 +52,7 @@ class MapsRow(QWidget):
         self._image = shown.image if shown is not None else None
         self.picture.setVisible(shown is not None)
         self.pattern.setVisible(shown is not None)
+        self.grow.show_texture(shown)
         if shown is None:
             self.text.setText("No pictures: every spot is alike")
             return

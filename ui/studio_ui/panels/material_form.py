@@ -18,6 +18,7 @@ from studio_core.params import ParamInfo, Value, defaults, param_infos
 from studio_core.scene.geometry import Image, Table, Texture
 from studio_core.scene.nodes import Material, MaterialId
 from studio_core.scene.pattern import PatternRuler
+from studio_core.shading.grown_textures import grown, lying_alike
 from studio_core.shading.job import Job
 from studio_core.shading.materials import shape_textures
 from studio_ui.context import Context
@@ -190,6 +191,7 @@ class MaterialForm(QWidget):
             lambda: self._ask_picture(name),
             lambda texture: self._put_texture(material, name, texture),
             lambda texture: self._lay(material, name, texture),
+            lambda times: self.grow_pictures(material, name, times),
         )
         self.textures[name] = made
         layout.addRow(form_label(f"{label} map", "A picture that the value is multiplied with"), made)
@@ -199,7 +201,12 @@ class MaterialForm(QWidget):
     def _pattern(self, material: MaterialId, names: tuple[str, ...], kind: str) -> QWidget:
         box = QWidget()
         layout = form_layout(box)
-        self.maps = MapsRow(names, self._tool, lambda name, texture: self._lay(material, name, texture))
+        self.maps = MapsRow(
+            names,
+            self._tool,
+            lambda name, texture: self._lay(material, name, texture),
+            lambda name, times: self.grow_pictures(material, name, times),
+        )
         told = "What each spot has of its own, as it was photographed"
         layout.addRow(form_label(f"{kind} pattern", told), self.maps)
         layout.addRow(self.maps.pattern)
@@ -311,3 +318,20 @@ class MaterialForm(QWidget):
         alike = tuple(key for key, one in there.textures.items() if one.affine == there.textures[name].affine)
         laid = (texture.scale, texture.offset, texture.rotation, texture.aspect)
         self._context.editing.apply(LayTextures(material, *laid, alike, f"Pattern of {there.name}"))
+
+    def grow_pictures(self, material: MaterialId, name: str, times: int) -> None:
+        """Larger pictures that do not repeat, of this one and all that lie as it does; in the background."""
+        before = self._context.document.scene.material(material)
+        alike, seed = lying_alike(before.textures, name), len(self._context.document.history)
+
+        def work(job: Job) -> dict[str, Texture]:
+            return grown(alike, times, seed=seed, job=job)
+
+        def done(found: dict[str, Texture]) -> None:
+            there = self._context.document.scene.materials.get(material)
+            if there is None or any(there.textures.get(key) is not one for key, one in alike.items()):
+                return  # something else lies there meanwhile
+            edits = tuple(SetTexture(material, key, one) for key, one in found.items())
+            self._context.editing.apply(Compound(f"Larger pattern of {there.name}", edits))
+
+        self._context.tasks.run(f"Growing the pattern of {before.name}", work, done)

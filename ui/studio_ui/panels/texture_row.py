@@ -11,6 +11,7 @@ from PySide6.QtWidgets import QLabel, QToolButton, QVBoxLayout, QWidget
 
 from studio_core.scene.geometry import Image, Texture
 from studio_core.scene.pattern import UnitLengths
+from studio_ui.panels.grow_button import GrowButton
 from studio_ui.panels.panel import row
 from studio_ui.panels.pattern_row import PatternRow
 
@@ -20,8 +21,8 @@ _ICON = QSize(40, 26)
 class TextureRow(QWidget):
     """`ask()` wants another picture, `put(texture)` is an edit; None takes the picture away.
 
-    `lay(texture)` is one too, of all pictures that lie as this one does. `pattern` says how it lies; whoever
-    makes the row puts it below, where it has all of the width.
+    `lay(texture)` is one too, of all pictures that lie as this one does; `grow(times)` makes these larger.
+    `pattern` says how it lies; whoever makes the row puts it below, where it has all of the width.
     """
 
     def __init__(
@@ -31,6 +32,7 @@ class TextureRow(QWidget):
         ask: Callable[[], object],
         put: Callable[[Texture | None], object],
         lay: Callable[[Texture], object],
+        grow: Callable[[int], object],
     ) -> None:
         super().__init__()
         self._texture: Texture | None = None
@@ -42,10 +44,11 @@ class TextureRow(QWidget):
         self.remove = tool("cancel", "Take the picture away")
         self.remove.clicked.connect(lambda: put(None))
         self.pattern = PatternRow(tool, lay)
+        self.grow = GrowButton(tool, grow)
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)
         column.setSpacing(2)
-        column.addLayout(row(self.picture, self.text, load, self.remove, stretch=1))
+        column.addLayout(row(self.picture, self.text, load, self.grow.button, self.remove, stretch=1))
 
     def show_texture(self, texture: Texture | None, lengths: UnitLengths | None) -> None:
         """What lies there now, on surfaces with such lengths."""
@@ -56,6 +59,7 @@ class TextureRow(QWidget):
         self._texture = texture
         self.remove.setEnabled(texture is not None)
         self.pattern.setVisible(texture is not None)
+        self.grow.show_texture(texture)
         if texture is None:
             self.text.setText("No picture")
             return
