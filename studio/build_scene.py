@@ -110,15 +110,9 @@ def parse_camera(text: str) -> tuple[Transform, float, float]:
 
 def load_model(path: Path, registry: Registry, unit: float = 1.0) -> ImportedModel:
     """Read a model by its extension; InputError when no importer knows it."""
-    suffix = path.suffix.lower()
-    known: list[str] = []
-    for name in registry.names("importer"):
-        importer = registry.get("importer", name)
-        known.extend(importer.extensions)
-        if suffix in importer.extensions:
-            model: ImportedModel = importer.load(path, unit)
-            return model
-    raise InputError(f"{path}: files of this kind cannot be read (known: {', '.join(sorted(known))})")
+    from studio_core.exchange.files import importer_of
+
+    return importer_of(registry, path).load(path, unit)
 
 
 def floor(size: float) -> tuple[MeshObject, Material]:

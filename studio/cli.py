@@ -15,7 +15,7 @@ from studio_core.errors import InputError, LucarneError
 
 VERBS = (
     *("demo", "new", "info", "copy", "compact", "render", "frames", "radiance", "precompute", "export"),
-    *("capture", "fit-brdf", "fit-material", "script", "bench", "stress", "doctor"),
+    *("capture", "fit-brdf", "fit-material", "materials", "script", "bench", "stress", "doctor"),
 )
 BAD_INPUT, OUR_FAULT, INTERRUPTED, NOBODY_READS = 2, 70, 130, 141
 TRACEBACK = "LUCARNE_TRACEBACK"
@@ -147,6 +147,10 @@ def _run(options: argparse.Namespace) -> int:
                 from studio.verbs_captured import fit_material
 
                 return fit_material(options, program) or 0
+            if options.verb == "materials":
+                from studio.verbs_exchange import materials
+
+                return materials(options, program) or 0
             if options.verb == "capture":
                 from studio.verbs_capture import capture
 
@@ -286,11 +290,11 @@ def parser() -> argparse.ArgumentParser:
     precompute.add_argument("--camera", metavar="NAME", help="from here first (default: the first camera)")
     _backend_options(precompute)
 
-    export = verb("export", "write a project as GLB, or as a Mitsuba 3 scene folder")
+    export = verb("export", "write a project as GLB or MaterialX, or as a Mitsuba 3 scene folder")
     export.add_argument("project", type=Path, metavar="PROJECT")
-    export.add_argument("-o", "--out", type=Path, required=True, metavar="(OUT.glb|DIR)")
+    export.add_argument("-o", "--out", type=Path, required=True, metavar="(OUT.glb|OUT.mtlx|DIR)")
 
-    from studio import capture_options, verbs_captured, verbs_materials
+    from studio import capture_options, verbs_captured, verbs_exchange, verbs_materials
 
     text = "a room's light from photographs of it, taken at several exposures"
     capture_options.add_options(verb("capture", text))
@@ -298,6 +302,8 @@ def parser() -> argparse.ArgumentParser:
     verbs_materials.add_options(verb("fit-brdf", text))
     text = "a material from photographs of a ball of it under known lights"
     verbs_captured.add_options(verb("fit-material", text))
+    text = "the materials of a file: list them, keep them, or write them as another kind"
+    verbs_exchange.add_options(verb("materials", text))
 
     script = verb("script", "run a Python file with the names of the console", json=False)
     text = "what the script's names mean; saved where it says save()"

@@ -425,6 +425,7 @@ def test_no_verb_without_a_window_loads_qt(files: Path) -> None:
         ["capture", "--equirect", "all.jpg", "-o", "light.exr", "--set", "stitch.width=64"],
         ["fit-brdf", "chalk.csv", "--model", "lambert", "-o", "chalk.lucmat"],
         ["fit-material", "ball", "--size", "8", "--no-refine", "--basis", "albedo"],
+        ["materials", "chalk.lucmat", "-o", "chalk.glb"],
         ["doctor"],
     ]
     (files / "ball").mkdir()

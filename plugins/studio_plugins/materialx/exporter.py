@@ -54,7 +54,7 @@ class MaterialXExporter:
             raise InputError(f"{path} cannot be written: {error.strerror or error}") from None
         finally:
             beside.unlink(missing_ok=True)
-        if any(not isinstance(node, MeshObject) for node in scene.nodes.values()) or used:
+        if any(not isinstance(node, MeshObject) for node in scene.nodes.values()):
             writer.notes.append("MaterialX holds materials alone; objects, lights and cameras were left out.")
         return tuple(writer.notes)
 

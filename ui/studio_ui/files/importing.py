@@ -9,10 +9,9 @@ from pathlib import Path
 
 import numpy as np
 
-from studio_core.contract import ImportedModel, Importer
+from studio_core.contract import ImportedModel
 from studio_core.edits import Add, Move
-from studio_core.errors import InputError, PluginError
-from studio_core.registry import PluginHost
+from studio_core.exchange.files import importer_of
 from studio_core.scene.arranging import roots
 from studio_core.scene.bounds import exact_bounds
 from studio_core.scene.imported import UPRIGHT, Up, converted
@@ -176,20 +175,6 @@ class Importing:
         filters = [Filter(importer.label, tuple(importer.extensions)) for importer in found]
         every = tuple(e for f in filters for e in f.extensions)
         return [Filter("All that can be imported", every), *filters]
-
-
-def importer_of(host: PluginHost, path: Path) -> Importer:
-    """The importer that reads files of that ending; InputError naming those that can be read."""
-    known: list[str] = []
-    for name in host.names("importer"):
-        try:
-            importer: Importer = host.get("importer", name)
-        except PluginError:
-            continue
-        if path.suffix.lower() in importer.extensions:
-            return importer
-        known += importer.extensions
-    raise InputError(f"{path.name} cannot be imported: known kinds are {', '.join(known) or 'none'}")
 
 
 def corrected(scene: Scene, nodes: Sequence[NodeId], factor: float, up: Up) -> Move:

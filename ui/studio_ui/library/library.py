@@ -10,14 +10,13 @@ from PySide6.QtCore import QFile
 
 from studio_core.errors import InputError
 from studio_core.folders import user_materials
-from studio_core.library.lucmat import SUFFIX, Kept, write
+from studio_core.library.lucmat import SUFFIX, Kept
 from studio_core.library.shelf import Entry, Shelf, file_stem
 from studio_core.scene.nodes import Material
 from studio_core.shading.job import Job
 from studio_core.signal import Signal
 from studio_ui.ask import Ask, Filter
 from studio_ui.context import Context
-from studio_ui.files.importing import importer_of
 
 FILES = Filter("Materials", (SUFFIX,))
 
@@ -166,16 +165,11 @@ class MaterialLibrary:
         for path in paths:
 
             def put(job: Job, path: Path = path) -> tuple[list[Path], tuple[str, ...]]:
-                from studio_core.library.lucmat import read
+                from studio_core.exchange.files import materials_of
 
-                if path.suffix.lower() == SUFFIX:
-                    return [self.shelf.put(read(path))], ()
-                model = importer_of(host, path).load(path)
+                found, notes = materials_of(path, host)
                 job.checkpoint()
-                if not model.materials:
-                    raise InputError(f"{path.name} holds no material.")
-                tags = () if model.nodes else ("measured",)
-                return [self.shelf.put(Kept(material, tags)) for material in model.materials], model.notes
+                return [self.shelf.put(kept) for kept in found], notes
 
             def done(found: tuple[list[Path], tuple[str, ...]], path: Path = path) -> None:
                 for note in found[1]:
@@ -202,19 +196,29 @@ class MaterialLibrary:
         """The same for whole materials: one as a file, several into a folder."""
         if len(found) == 1:
             suggested = Path.home() / f"{file_stem(found[0].name)}{SUFFIX}"
-            path = self._ask.save_file(f"Export {found[0].name}", suggested, [FILES])
+            path = self._ask.save_file(f"Export {found[0].name}", suggested, self._written())
+            known = {ending for one in self._written() for ending in one.extensions}
+            if path is not None and path.suffix.lower() not in known:
+                path = path.with_name(path.name + SUFFIX)
             targets = [path] if path is not None else []
         else:
             folder = self._ask.folder(f"Export {len(found)} materials")
             targets = _targets(folder, found) if folder is not None else []
         if not targets:
             return
+        host = self._context.host
 
-        def put(job: Job) -> None:
+        def put(job: Job) -> list[str]:
+            from studio_core.exchange.files import write_materials
+
+            notes: list[str] = []
             for path, kept in zip(targets, found, strict=True):
-                write(path, kept)
+                notes += write_materials(path, [kept], host)
+            return notes
 
-        def done(_: None) -> None:
+        def done(notes: list[str]) -> None:
+            for note in notes:
+                self._context.journal.write(note, "warning")
             where = (
                 targets[0].name if len(targets) == 1 else f"{len(targets)} files in {targets[0].parent.name}"
             )
@@ -231,6 +235,14 @@ class MaterialLibrary:
         others = [one for one in others if SUFFIX not in one.extensions]
         every = tuple(dict.fromkeys((SUFFIX, *(e for one in others for e in one.extensions))))
         return [Filter("All that holds materials", every), FILES, *others]
+
+    def _written(self) -> list[Filter]:
+        """Kinds that a material can be written as."""
+        if not self._context.warm:
+            return [FILES]
+        from studio_core.exchange.files import kinds
+
+        return [FILES, *(Filter(label, endings) for label, endings in kinds(self._context.host)[1:])]
 
     def _change(self, entry: Entry, work: Callable[[], Path]) -> None:
         def put(job: Job) -> Path:
