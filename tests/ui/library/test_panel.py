@@ -248,6 +248,27 @@ def test_files_of_materials_are_imported(driver: Driver, panel: LibraryPanel, tm
     assert len(driver.labels()) == 1, "the scene is as it was"
 
 
+def test_materials_go_out_as_models_and_come_back(make: Make, tmp_path: Path) -> None:
+    from studio_plugins.brdfs import plugin as brdfs
+    from studio_plugins.export import plugin as export
+    from studio_plugins.meshes import plugin as meshes
+
+    driver = make(plugins=(brdfs, meshes, export))
+    driver.show(room())
+    library = driver.window.panels["library"].library
+    library.shelf = Shelf(tmp_path / "mine", PRESETS)
+    brass = next(kept for kept in PRESETS if kept.name == "Brass, satin")
+    driver.answers.target = tmp_path / "brass.glb"
+    library.export_kept([brass])
+    driver.until((tmp_path / "brass.glb").is_file)
+    library.import_files([tmp_path / "brass.glb"])
+    driver.until((tmp_path / "mine" / "Brass, satin.lucmat").is_file)
+    assert read(tmp_path / "mine" / "Brass, satin.lucmat").material.values["metallic"] == 1
+    driver.answers.target = tmp_path / "without an ending"
+    library.export_kept([brass])
+    driver.until((tmp_path / "without an ending.lucmat").is_file)
+
+
 def test_a_material_file_is_dropped_on_the_window(driver: Driver, tmp_path: Path) -> None:
     path = tmp_path / "Velvet.lucmat"
     write(path, Kept(Material(id="x", name="Velvet", model="oren-nayar")))
