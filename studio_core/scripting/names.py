@@ -26,6 +26,7 @@ from studio_core.scene.transform import Transform, axis_angle, vec3
 from studio_core.scripting import find as finding
 from studio_core.scripting.patterns import Patterns
 from studio_core.scripting.placing import Placing
+from studio_core.scripting.shelved import Shelved
 from studio_core.scripting.shown import help_text, overview
 from studio_core.session import Session, View
 from studio_core.shading.job import Job
@@ -52,7 +53,7 @@ GROUPS: dict[str, tuple[str, ...]] = {
             "grow_pattern",
             "remove",
         ),
-        *("add_model", "light_from", "apply", "undo", "redo"),
+        *("add_model", "add_material", "keep_material", "light_from", "apply", "undo", "redo"),
     ),
     "Look and render": ("look_through", "picture", "render"),
     "Files": ("save",),
@@ -76,7 +77,7 @@ def at_once(label: str, work: Callable[[Job], T]) -> T:
     return work(Job(label))
 
 
-class Names(Placing, Patterns):
+class Names(Placing, Patterns, Shelved):
     """Fills `namespace` and keeps its `scene` the current one until `close`.
 
     `services` is asked for when something is rendered; `run(label, work)` does what takes long and gives
@@ -260,7 +261,7 @@ class Names(Placing, Patterns):
     def add_model(self, path: str | Path, at: npt.ArrayLike = (0.0, 0.0, 0.0), unit: float = 1.0) -> Any:
         """Add a model from a file, standing `at` a point; `unit` is the file's, in metres. The new node.
 
-        Of a file with a measured material (`.binary`, `.astm`, `.csv`), the new material.
+        Of a file with a material alone (`.lucmat`, `.binary`, `.astm`, `.csv`), the new material.
         """
         path = Path(path)
         model: ImportedModel = self._run(f"Importing {path.name}", lambda job: self._load(path, unit))

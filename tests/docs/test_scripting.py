@@ -47,6 +47,9 @@ CHECKS: dict[str, Callable[[Scene, Scene, str, Path], bool]] = {
         int(said.split()[0]) == sum("material-walnut" in node.materials for node in b.of(MeshObject)) > 0
         and not any("material-walnut" in node.materials for node in a.of(MeshObject))
     ),
+    "A material of the library": lambda b, a, *_: (
+        {m.name for m in a.materials.values()} - {m.name for m in b.materials.values()} == {"Walnut, oiled"}
+    ),
     "A new material for one thing": lambda b, a, *_: len(a.materials) == len(b.materials) + 1,
     "Sweep the light and write pictures": lambda b, a, said, folder: len([*folder.glob("light-*.png")]) == 3,
     "A picture through every camera": lambda b, a, said, folder: len([*folder.glob("*.png")]) == 3,

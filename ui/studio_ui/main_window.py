@@ -37,6 +37,7 @@ from studio_ui.keyboard import Keyboard
 from studio_ui.layout import Layout
 from studio_ui.layouts import Layouts
 from studio_ui.library.library import MaterialLibrary
+from studio_ui.library.palette_entries import library_entries
 from studio_ui.library.taking import Taking
 from studio_ui.look.appearance import Appearance
 from studio_ui.look.badge import Badge
@@ -189,6 +190,7 @@ class MainWindow(QMainWindow):
                 lambda: menu_entries(self.menuBar(), self.actions_.reasons()),
                 chosen.entries,
                 lambda: scene_entries(context),
+                lambda: library_entries(self.library, self.taking),
             ],
         )
         return [

@@ -110,7 +110,10 @@ def test_what_is_chosen_gets_it_in_one_step(driver: Driver, panel: LibraryPanel)
     assert scene.material(brass).model == "ggx-conductor"
     assert driver.labels()[1:] == ["Brass, polished on 2 objects"]
     driver.session.select(["stool"])
-    panel.view.activated.emit(panel.view.currentIndex())
+    at = panel.view.visualRect(panel.view.currentIndex()).center()
+    driver.bot.mouseClick(panel.view.viewport(), Qt.MouseButton.LeftButton, pos=at)
+    assert driver.document.scene["stool"].materials == ("blue",), "one click chooses alone"
+    driver.bot.mouseDClick(panel.view.viewport(), Qt.MouseButton.LeftButton, pos=at)
     assert driver.document.scene["stool"].materials == (brass,), "the same brass is not added twice"
     driver.do("edit.undo")
     driver.do("edit.undo")
@@ -303,6 +306,16 @@ def test_opening_a_material_keeps_it_once_and_shows_it(
     driver.idle()
     assert len(list((tmp_path / "mine").iterdir())) == 1
     assert driver.labels() == ["Open"], "the project that is open stays"
+
+
+def test_the_palette_finds_it(driver: Driver, panel: LibraryPanel) -> None:
+    driver.session.select(["stool"])
+    driver.do("help.palette")
+    palette = driver.window.palette_
+    palette.edit.setText("walnut oiled")
+    assert (palette.found[0].title, palette.found[0].place) == ("Walnut, oiled", "Library ▸ Give to Stool")
+    driver.bot.keyClick(palette.edit, Qt.Key.Key_Return)
+    assert driver.labels()[-1] == "Walnut, oiled on Stool"
 
 
 def test_only_pictures_that_are_seen_are_made(make: Make, tmp_path: Path) -> None:

@@ -55,7 +55,7 @@ class LibraryView(QListView):
         self.setDropIndicatorShown(False)
         self.setContextMenuPolicy(Qt.ContextMenuPolicy.CustomContextMenu)
         self.setMinimumHeight(48)
-        self.activated.connect(lambda index: self.activate())
+        self.doubleClicked.connect(lambda index: self.activate())  # `activated` comes of one click in places
         self.selectionModel().selectionChanged.connect(lambda *_: self.chosen())
         self._settle = QTimer(self)
         self._settle.setSingleShot(True)
@@ -136,8 +136,11 @@ class LibraryView(QListView):
     def keyPressEvent(self, event: QKeyEvent) -> None:
         """Home and End lead to materials, not to headings."""
         key = event.key()
-        if key == Qt.Key.Key_Delete and self.entries and self.state() != self.State.EditingState:
+        editing = self.state() == self.State.EditingState
+        if key == Qt.Key.Key_Delete and self.entries and not editing:
             self.remove()
+        elif key in (Qt.Key.Key_Return, Qt.Key.Key_Enter) and self.entries and not editing:
+            self.activate()
         elif key in (Qt.Key.Key_Home, Qt.Key.Key_End) and self._to_end(key == Qt.Key.Key_End):
             event.accept()
         else:
