@@ -29,13 +29,14 @@ settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "ci" if os.environ.ge
 def own_state(
     monkeypatch: pytest.MonkeyPatch, tmp_path_factory: pytest.TempPathFactory, request: pytest.FixtureRequest
 ) -> Path:
-    """A state folder for each test: recovery files and recent projects never meet the user's own.
+    """A state folder for each test: recovery files, recent projects and kept materials never meet the user's.
 
     The cache of compiled kernels stays shared, so that they compile once.
     """
     name = "".join(c if c.isalnum() else "-" for c in request.node.name)[:60]
     state = tmp_path_factory.getbasetemp() / "state" / name
     monkeypatch.setenv("LUCARNE_STATE", str(state))
+    monkeypatch.setenv("LUCARNE_MATERIALS", str(state / "materials"))
     return state
 
 
