@@ -48,8 +48,18 @@ class Flat:
         above = (wi[:, 2] > LOWEST) & (wo[:, 2] > LOWEST)
         weight = np.sin(2 * theta_d)[above]
         light, view = wi[above].astype(np.float32), wo[above].astype(np.float32)
-        values = evaluate_pairs(self.resolved.brdf, self.shape, view, light).astype(np.float64) @ self.colours
-        return Samples(light, view, values, weight / weight.mean())
+        return Samples(light, view, self.at(light, view), weight / weight.mean())
+
+    def at(self, wi: npt.NDArray[np.float32], wo: npt.NDArray[np.float32]) -> F64:
+        """(N, 3) f_r of unit directions (N, 3)."""
+        terms = evaluate_pairs(self.resolved.brdf, self.shape, wo, wi)
+        return np.asarray(terms.astype(np.float64) @ self.colours)
+
+
+def between(made: Resolved, meant: Resolved) -> float:
+    """The metric by which one material of ours is off another one."""
+    samples = Flat.of(meant).samples()
+    return difference(Flat.of(made).at(samples.wi, samples.wo), samples).metric
 
 
 def distance(surface: Surface, samples: Samples) -> Difference:

@@ -18,7 +18,7 @@ from studio_core.exchange.surface import Surface, ior_of, stretched
 
 F64 = npt.NDArray[np.float64]
 MOST_SAMPLES = 800
-HIGHEST_F0 = 0.5
+HIGHEST_F0 = 0.25  # an index of 3: more is not known everywhere
 _ROUGH = (0.15, 0.4, 0.8)
 _STEPS = 20
 

@@ -201,9 +201,8 @@ def _highlight(resolved: Resolved, notes: list[str]) -> Surface:
         laid = _laid(resolved, base_color="specular", roughness="roughness")
         return replace(made, base_color=_colour(specular), metallic=1.0, textures=laid)
     strongest = float(specular.max())
-    weight = (
-        1.0 if coat else min(max(2 * strongest, 1e-3), 1.0)
-    )  # the rim is not much brighter than the middle
+    # No coat: the rim reflects at most four times what the middle does.
+    weight = 1.0 if coat else min(max(4 * strongest, 1e-3), 1.0)
     base = diffuse if coat else np.minimum(diffuse / max(1 - strongest, 1e-3), 1.0)
     return replace(
         made,

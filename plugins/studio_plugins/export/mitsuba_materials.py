@@ -7,7 +7,7 @@ lambert        `diffuse`
 phong          `lucarne_phong` (bsdfs.py)
 blinn-phong    `lucarne_blinn_phong` (bsdfs.py)
 ggx            `roughconductor` without material where F = 1 (white metal); else `lucarne_ggx`
-any other      `diffuse` of its mean albedo, with a note
+any other      the nearest of `diffuse` and `lucarne_ggx`, with a note that tells how far it is
 =============  =====================================================================================
 
 All are wrapped in `twosided`, and in `mask` where opacity is below 1.
@@ -16,7 +16,7 @@ All are wrapped in `twosided`, and in `mask` where opacity is below 1.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 from xml.etree.ElementTree import Element
@@ -26,6 +26,8 @@ import numpy.typing as npt
 
 from studio_core.brdfs.albedo import mean_albedo
 from studio_core.contract import Registry
+from studio_core.exchange.measuring import between
+from studio_core.exchange.outgoing import surface_of
 from studio_core.imaging.encode import write_exr, write_png
 from studio_core.params import Value, param_infos
 from studio_core.scene.geometry import Texture
@@ -35,6 +37,7 @@ from studio_plugins.export.mitsuba_xml import prop, put, ref, rgb
 
 OWN = {"phong": "lucarne_phong", "blinn-phong": "lucarne_blinn_phong", "ggx": "lucarne_ggx"}
 LEAST_ALPHA = 1e-4
+MATTE = 1e-3  # reflectance head-on under which nobody sees a shine
 
 
 @dataclass
@@ -106,9 +109,12 @@ class Materials:
                 else:
                     self._parameter(made, name, resolved, name)
         else:
-            self.notes.append(f"{material.name}: Mitsuba has no {resolved.brdf.label}; written as matte.")
-            made = put(self.root, "bsdf", "diffuse", key=key)
-            rgb(made, "reflectance", np.clip(mean_albedo(resolved.brdf, resolved.values), 0, 1))
+            near = nearest(material, resolved, self.registry)
+            off = between(resolve(near, self.registry), resolved)
+            label = self.registry.brdf(near.model).label
+            told = f"Mitsuba has no {resolved.brdf.label}; written as {label}, {off:.1%} off."
+            self.notes.append(f"{material.name}: {told}")
+            self._bsdf(near, key)
 
     def _parameter(self, parent: Element, name: str, resolved: Resolved, source: str) -> None:
         value, texture = resolved.values[source], resolved.textures.get(source)
@@ -150,6 +156,26 @@ class Materials:
                 scalar = linear(image)[..., :1] * np.asarray(value, np.float32)
                 write_exr(target, np.clip(scalar, 0, 1))
         return self._files[known], not as_it_is
+
+
+def nearest(material: Material, resolved: Resolved, registry: Registry) -> Material:
+    """The nearest that Mitsuba can have: matte where it hardly shines, else metallic-roughness."""
+    found = surface_of(material, registry).surface.smooth()
+    textures = {"base_color": found.textures["base_color"]} if "base_color" in found.textures else {}
+    values: dict[str, Value] = {"base_color": found.base_color}
+    if found.metallic <= 0 and found.specular * found.f0 < MATTE:
+        if max(found.sheen_color) > 0 and not resolved.textures:
+            red, green, blue = (float(c) for c in np.clip(mean_albedo(resolved.brdf, resolved.values), 0, 1))
+            values["base_color"] = (red, green, blue)
+        return replace(material, model="lambert", values=values, textures=textures)
+    wide, narrow = found.alphas
+    strength = found.f0 * found.specular * max(found.specular_color)
+    values |= {
+        "metallic": found.metallic,
+        "roughness": float((wide * narrow) ** 0.25),
+        "specular": min(strength / 0.08, 1.0),
+    }
+    return replace(material, model="ggx", values=values, textures=textures)
 
 
 def _three(pixels: npt.NDArray[Any]) -> npt.NDArray[Any]:
