@@ -30,7 +30,7 @@ def test_presets(host: PluginHost, name: str, model: str, most: float) -> None:
     meant = resolve(material, host)
     made = nearest(material, meant, host)
     assert (made.model, made.id) == (model, material.id)
-    matte: Any = Material(id="x", model="lambert", values={"base_color": (0.5, 0.5, 0.5)})
+    matte: Any = Material(id="x", model="lambert", values={"base_color": (0.2, 0.2, 0.2)})
     off = between(resolve(made, host), meant)
     assert off < most
     assert off < between(resolve(matte, host), meant)
