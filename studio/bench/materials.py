@@ -14,6 +14,7 @@ from studio.headless import Headless
 IN_PARTS = True
 PARTS = (
     "studio.bench.materials_energy",
+    "studio.bench.materials_exchange",
     "studio.bench.materials_normals",
     "studio.bench.materials_captured",
     "studio.bench.materials_btf",

@@ -28,3 +28,12 @@ def test_rows_of_models(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> N
     table = capsys.readouterr().out
     assert "| lambert | 0 | 1.000 |" in table
     assert "| phong | 0.75 | 1.000 |" in table
+
+
+def test_rows_of_exchange(tmp_path: Path) -> None:
+    target = tmp_path / "rows.json"
+    assert main(["bench", "materials", "--quick", "--only", "exchange/cloth", "--json", str(target)]) == 0
+    found = {row["metric"]: row["value"] for row in json.loads(target.read_text())["rows"]}
+    assert 0 < found["glb_error"] < 0.01
+    assert found["glb_again_error"] < 1e-3
+    assert found["mitsuba_error"] < 0.05
