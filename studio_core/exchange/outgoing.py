@@ -39,6 +39,7 @@ from studio_core.params import Colour
 from studio_core.scene.geometry import Image, Texture
 from studio_core.scene.nodes import Material
 from studio_core.shading.materials import Resolved, coefficients, first_channel, resolve
+from studio_core.shading.normal_maps import normal_texture, strength
 
 _NARROWER = ("ward", "ashikhmin-shirley")
 SAME = 5e-4  # of the metric: nobody sees it
@@ -82,15 +83,16 @@ def surface_of(material: Material, registry: Registry) -> Outgoing:
     else:
         made = _fitted(resolved, flat, samples)
     textures = dict(made.textures)
-    strength: Any = 1.0
-    if NORMAL in material.textures:
-        textures[NORMAL] = material.textures[NORMAL]
-        strength = material.values.get(NORMAL, 1.0)
+    strong = 1.0
+    bumps = normal_texture(material)
+    if bumps is not None:
+        textures[NORMAL] = bumps
+        strong = strength(material)
     made = replace(
         made,
         name=material.name,
         opacity=float(material.opacity),
-        normal_strength=float(strength),
+        normal_strength=strong,
         textures=frozen_map(textures),
     )
     named = tuple(note if note.startswith(material.name) else f"{material.name}: {note}" for note in notes)

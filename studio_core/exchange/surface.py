@@ -18,10 +18,10 @@ import numpy as np
 from studio_core.arrays import frozen_map
 from studio_core.params import Colour, Value
 from studio_core.scene.geometry import Image, Texture
+from studio_core.shading.normal_maps import NORMAL as NORMAL
 
 WHITE: Colour = (1.0, 1.0, 1.0)
 BLACK: Colour = (0.0, 0.0, 0.0)
-NORMAL = "normal"
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -234,21 +234,26 @@ def _finite(pixels: npt.NDArray[Any], facts: Facts, plain: bool) -> Image:
 
 
 def read_image(
-    source: str | os.PathLike[str] | bytes, name: str = "", decoder: ImageDecoder | None = None
+    source: str | os.PathLike[str] | bytes,
+    name: str = "",
+    decoder: ImageDecoder | None = None,
+    *,
+    plain: bool = False,
 ) -> Image:
     """A picture from a file, or from a file's bytes that messages call `name`.
 
     OpenEXR, Radiance and floating-point TIFF give linear float32 Rec.709; 8 bits stay sRGB-encoded
     uint8; 16 bits are decoded to linear float32. (H, W, C): grey 1, colour 3, with alpha 4. NaN becomes 0,
     Inf the brightest other number.
-    Without a `decoder` one is started for this picture alone. Raises InputError.
+    `plain` as for `ImageDecoder.read`. Without a `decoder` one is started for this picture alone. Raises
+    InputError.
     """
     if decoder is None:
         with ImageDecoder() as made:
-            return read_image(source, name, made)
+            return read_image(source, name, made, plain=plain)
     if isinstance(source, bytes):
-        return decoder.decode(source, name or "the picture")
-    return decoder.read(source)
+        return decoder.decode(source, name or "the picture", plain=plain)
+    return decoder.read(source, plain=plain)
 
 
 def suffix_of(start: bytes, given: str) -> str | None:

@@ -62,6 +62,20 @@ def unit_normals(image: Image, strong: float = 1.0) -> F32:
     return made
 
 
+def of_heights(image: Image, high: float) -> Image:
+    """The normal map of a picture of heights (its first channel): white is `high` widths of it above black.
+
+    Slopes are central differences; the picture is repeated.
+    """
+    pixels = image.pixels[..., 0].astype(np.float32)
+    heights = pixels * np.float32(high * pixels.shape[1] / (255 if image.pixels.dtype == np.uint8 else 1))
+    across = (np.roll(heights, -1, axis=1) - np.roll(heights, 1, axis=1)) / 2
+    down = (np.roll(heights, -1, axis=0) - np.roll(heights, 1, axis=0)) / 2
+    normals = np.stack([-across, down, np.ones_like(across)], axis=2)
+    normals /= np.sqrt((normals * normals).sum(axis=2, keepdims=True))
+    return Image(np.rint((normals + 1) * np.float32(127.5)).astype(np.uint8), "data")
+
+
 def components(image: Image, strong: float) -> F32:
     """(H, W, 3) x, y and 1 − z in the picture's own frame, rows from v = 0 up."""
     made = np.ascontiguousarray(unit_normals(image, strong)[::-1])
@@ -124,6 +138,7 @@ __all__ = [
     "mean_slope",
     "normal_texture",
     "normals_at",
+    "of_heights",
     "slope_of",
     "strength",
     "turn",

@@ -219,6 +219,26 @@ def test_a_picture_of_the_roughness_is_plain_numbers(driver: Driver, tmp_path: P
         assert driver.document.scene.material("red").textures[name].image.encoding == encoding
 
 
+def test_a_normal_map_is_laid_made_stronger_and_kept_by_another_kind(driver: Driver, tmp_path: Path) -> None:
+    path = tmp_path / "bumps.png"
+    write_png(path, np.random.default_rng(1).integers(0, 256, (4, 6, 3), dtype=np.uint8))
+    panel = choose(driver, "red")
+    strength = panel.editor.bumps
+    assert strength.isHidden()
+    panel.load_picture("normal", path)
+    driver.until(lambda: "normal" in driver.document.scene.material("red").textures)
+    assert driver.document.scene.material("red").textures["normal"].image.encoding == "data"
+    driver.until(lambda: not strength.isHidden())
+    assert strength.fields["normal"].spin.value() == 1.0
+    strength.fields["normal"].spin.setValue(-0.5)
+    driver.until(lambda: driver.document.scene.material("red").values.get("normal") == -0.5)
+    assert driver.labels()[-1] == "Strength of Red"
+    panel.editor._change_model("ggx")
+    made = driver.document.scene.material("red")
+    assert (made.model, made.values["normal"]) == ("ggx", -0.5)
+    assert "normal" in made.textures
+
+
 def test_pictures_are_laid_repeated_and_taken_away(driver: Driver, tmp_path: Path) -> None:
     path = tmp_path / "wood.png"
     write_png(path, np.full((20, 40, 3), 120, np.uint8))

@@ -17,12 +17,13 @@ import numpy.typing as npt
 
 from studio_core.contract import Registry
 from studio_core.exchange.outgoing import surface_of
-from studio_core.exchange.surface import BLACK, WHITE, Surface, alike, times
+from studio_core.exchange.surface import BLACK, NORMAL, WHITE, Surface, alike, times
 from studio_core.imaging.encode import encode_png
 from studio_core.imaging.transfer import linear_to_srgb
 from studio_core.scene.geometry import Image, Texture
 from studio_core.scene.nodes import MaterialId, Scene
 from studio_core.shading.materials import first_channel, linear
+from studio_core.shading.normal_maps import unit_normals
 from studio_plugins.export.gltf_buffer import Buffer
 
 Json = dict[str, Any]
@@ -75,6 +76,8 @@ class Materials:
         if extensions:
             made["extensions"] = extensions
             self.extensions.update(extensions)
+        if NORMAL in surface.textures:
+            made["normalTexture"] = self._normals(surface.textures[NORMAL], surface.normal_strength)
         if surface.opacity < 1:
             made["alphaMode"] = "BLEND"
             base["baseColorFactor"][3] = surface.opacity
@@ -134,6 +137,15 @@ class Materials:
 
     def _colour(self, texture: Texture) -> Json:
         return self._texture(texture, "colour", _encoded(texture.image))
+
+    def _normals(self, texture: Texture, strong: float) -> Json:
+        """A normal map; a strength below 0, which readers may not expect, becomes one of its texels."""
+        normals = unit_normals(texture.image, math.copysign(1.0, strong))
+        pixels = np.rint((normals + 1) * 127.5).astype(np.uint8)
+        if texture.image.pixels.dtype == np.uint8 and strong >= 0:
+            pixels = np.ascontiguousarray(texture.image.pixels[..., :3])
+        made = self._texture(texture, f"normals {math.copysign(1.0, strong)}", pixels)
+        return made if abs(strong) == 1 else {**made, "scale": abs(strong)}
 
     def _weight(self, texture: Texture) -> Json:
         """Numbers in the alpha of a white picture."""

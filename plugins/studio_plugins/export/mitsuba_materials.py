@@ -10,7 +10,7 @@ ggx            `roughconductor` without material where F = 1 (white metal); else
 any other      the nearest of `diffuse` and `lucarne_ggx`, with a note that tells how far it is
 =============  =====================================================================================
 
-All are wrapped in `twosided`, and in `mask` where opacity is below 1.
+All are wrapped in `normalmap` where they have one, in `twosided`, and in `mask` where opacity is below 1.
 """
 
 from __future__ import annotations
@@ -33,6 +33,7 @@ from studio_core.params import Value, param_infos
 from studio_core.scene.geometry import Texture
 from studio_core.scene.nodes import Material, MaterialId, Scene
 from studio_core.shading.materials import Resolved, linear, resolve
+from studio_core.shading.normal_maps import normal_texture, strength, turn, unit_normals
 from studio_plugins.export.mitsuba_xml import prop, put, ref, rgb
 
 OWN = {"phong": "lucarne_phong", "blinn-phong": "lucarne_blinn_phong", "ggx": "lucarne_ggx"}
@@ -81,7 +82,15 @@ class Materials:
     def _side(self, key: MaterialId) -> str:
         if key not in self._sides:
             self._sides[key] = f"side-{len(self._sides)}"
-            self._bsdf(self.scene.material(key), self._sides[key])
+            material = self.scene.material(key)
+            bumps, inner = normal_texture(material), self._sides[key]
+            if bumps is not None:
+                inner = f"{inner}-flat"
+            self._bsdf(material, inner)
+            if bumps is not None:
+                made = put(self.root, "bsdf", "normalmap", key=self._sides[key])
+                self._bitmap(made, "normalmap", self._normals(material, bumps), True, bumps)
+                ref(made, inner)
         return self._sides[key]
 
     def _bsdf(self, material: Material, key: str) -> None:
@@ -127,8 +136,11 @@ class Materials:
 
     def _texture(self, parent: Element, name: str, value: Value, texture: Texture) -> None:
         """A bitmap of texture · value, in the studio's texture coordinates."""
-        made = put(parent, "texture", "bitmap", name=name)
         file, raw = self._picture(value, texture)
+        self._bitmap(parent, name, file, raw, texture)
+
+    def _bitmap(self, parent: Element, name: str, file: str, raw: bool, texture: Texture) -> None:
+        made = put(parent, "texture", "bitmap", name=name)
         prop(made, "string", "filename", file)
         prop(made, "boolean", "raw", raw)
         prop(made, "string", "filter_type", "bilinear")
@@ -138,6 +150,18 @@ class Materials:
         rows = ((a, b, 0.0, t), (-c, -d, 0.0, 1.0 - s), (0.0, 0.0, 1.0, 0.0), (0.0, 0.0, 0.0, 1.0))
         held = put(made, "transform", name="to_uv")
         put(held, "matrix").attrib["value"] = " ".join(repr(number) for row in rows for number in row)
+
+    def _normals(self, material: Material, texture: Texture) -> str:
+        """The file of a normal map at the material's strength, turned as it lies on the surface."""
+        strong, lies = strength(material), turn(texture)
+        known = (texture.image.key, strong, lies)
+        if known not in self._files:
+            normals = unit_normals(texture.image, strong)
+            normals[..., :2] = normals[..., :2] @ np.array(lies, np.float32).reshape(2, 2).T
+            (self.folder / "textures").mkdir(exist_ok=True)
+            self._files[known] = f"textures/{len(self._files)}.exr"
+            write_exr(self.folder / self._files[known], (normals + 1) / 2)
+        return self._files[known]
 
     def _picture(self, value: Value, texture: Texture) -> tuple[str, bool]:
         image, colour = texture.image, isinstance(value, tuple)

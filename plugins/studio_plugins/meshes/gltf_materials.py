@@ -16,7 +16,7 @@ from studio_core.arrays import frozen_map
 from studio_core.errors import InputError
 from studio_core.exchange.incoming import material_of
 from studio_core.exchange.pictures import Pictures, channel_of, mean_of, opaque
-from studio_core.exchange.surface import Surface, times
+from studio_core.exchange.surface import NORMAL, Surface, times
 from studio_core.params import Colour
 from studio_core.scene.geometry import Image, Texture
 from studio_core.scene.nodes import Material, new_id
@@ -73,7 +73,10 @@ class GltfMaterials:
         surface = self._layers(surface, extensions, slots)
         self._unused(source, extensions, name)
         alpha = self._opacity(source, extensions, surface.opacity, image, name)
-        surface = replace(surface, name=name, opacity=alpha, textures=frozen_map(slots.textures))
+        strong = slots.normals(source.get("normalTexture"))
+        surface = replace(
+            surface, name=name, opacity=alpha, normal_strength=strong, textures=frozen_map(slots.textures)
+        )
         return material_of(surface, self.notes.say), slots.uv_set or 0
 
     def _base(self, source: Json, extensions: Json, slots: _Slots) -> tuple[Surface, Image | None]:
@@ -150,7 +153,6 @@ class GltfMaterials:
 
     def _unused(self, source: Json, extensions: Json, name: str) -> None:
         for unused, word in (
-            ("normalTexture", "normal"),
             ("occlusionTexture", "occlusion"),
             ("emissiveTexture", "emission"),
         ):
@@ -272,6 +274,18 @@ class _Slots:
             return mean_of(image, channel)
         self.textures[target] = replace(placed, image=found)
         return 1.0
+
+    def normals(self, reference: object) -> float:
+        """Take a normal map; its strength."""
+        image = self.reader.image(reference, plain=True)
+        if image is None or not isinstance(reference, dict) or image.pixels.shape[2] < 3:
+            return 1.0
+        placed, own_set = self.reader.placing(reference, opaque(image))
+        if self.uv_set not in (None, own_set):
+            self.reader.notes.say(f"The normal map of {self.name!r} has other coordinates: it is not used.")
+            return 1.0
+        self.uv_set, self.textures[NORMAL] = own_set, placed
+        return self.reader.file.floats(reference, "scale", (1.0,))[0]
 
     def _fits(self, own_set: int, target: str) -> bool:
         if self.uv_set is None:

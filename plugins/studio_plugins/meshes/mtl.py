@@ -2,6 +2,8 @@
 
 Without specular colour, or with `illum` 0 and 1, a material is Lambert's; with one it is Blinn-Phong's
 (the format defines its highlight by (h·n)^Ns); with `Pr` or `Pm` (the PBR extension) it is GGX.
+Coloured pictures under `norm`, `map_Bump` or `bump` are normal maps, as programs write them; grey ones are
+heights, of which the format says no size: white is `-bm` hundredths of the picture's width above black.
 """
 
 from __future__ import annotations
@@ -15,12 +17,13 @@ from studio_core.exchange.pictures import Pictures, channel_of, mean_of, opaque
 from studio_core.params import Value
 from studio_core.scene.geometry import Texture
 from studio_core.scene.nodes import Material, new_id
+from studio_core.shading.normal_maps import NORMAL, of_heights
 from studio_plugins.meshes.common import PLAIN_GREY, Notes, colour, share
 
 _UNUSED = {
-    "map_bump": "bump",
-    "bump": "bump",
-    "norm": "normal",
+    "map_bump": "",
+    "bump": "",
+    "norm": "",
     "disp": "displacement",
     "map_ks": "specular",
     "map_ns": "sharpness",
@@ -29,6 +32,9 @@ _UNUSED = {
     "refl": "reflection",
     "decal": "decal",
 }
+_BUMPS = ("norm", "map_bump", "bump")
+HIGH = 0.01  # of the picture's width: how high white is
+GREY = 0.02  # difference of channels up to which a picture is grey
 _ARGUMENTS = {
     "-blendu": 1,
     "-blendv": 1,
@@ -53,6 +59,7 @@ class Map:
     scale: tuple[float, float] = (1.0, 1.0)
     offset: tuple[float, float] = (0.0, 0.0)
     clamped: bool = False
+    strength: float = 1.0
 
 
 @dataclass
@@ -102,7 +109,7 @@ def parse_mtl(text: str, notes: Notes) -> list[Entry]:
 def parse_map(rest: str) -> Map:
     """A texture statement's options and file name; the name may hold blanks."""
     words = rest.split(" ")
-    scale, offset, clamped = (1.0, 1.0), (0.0, 0.0), False
+    scale, offset, clamped, strength = (1.0, 1.0), (0.0, 0.0), False, 1.0
     at = 0
     while at < len(words):
         option = words[at].lower()
@@ -117,10 +124,12 @@ def parse_map(rest: str) -> Map:
                 offset = (values[0], values[1] if len(values) > 1 else 0.0)
         elif option in _ARGUMENTS:
             clamped |= option == "-clamp" and words[at + 1 : at + 2] == ["on"]
+            if option == "-bm":
+                strength = next(iter(_numbers(words[at + 1 : at + 2])), 1.0)
             at += 1 + _ARGUMENTS[option]
         else:
             break
-    return Map(" ".join(words[at:]).strip(), scale, offset, clamped)
+    return Map(" ".join(words[at:]).strip(), scale, offset, clamped, strength)
 
 
 def _numbers(words: Sequence[str]) -> tuple[float, ...]:
@@ -162,7 +171,10 @@ def material_of(entry: Entry, pictures: Pictures, notes: Notes) -> Material:
         values = {"diffuse": base, "specular": shine, "exponent": exponent}
     else:
         model, values = "lambert", {"base_color": base}
-    unused = sorted({_UNUSED[key] for key in entry.maps if key in _UNUSED})
+    bumps = _bumps(entry, pictures)
+    if bumps is not None:
+        shaped[NORMAL], values[NORMAL] = bumps
+    unused = sorted({_UNUSED[key] for key in entry.maps if _UNUSED.get(key)})
     for kind in unused:
         notes.say(f"The {kind} map of {entry.name!r} is not used.")
     if max(entry.colour("ke", 0.0)) > 0:
@@ -202,6 +214,17 @@ def _share(
     if channel is None:
         return mean_of(image, 0), None
     return 1.0, Texture(channel, statement.scale, statement.offset)
+
+
+def _bumps(entry: Entry, pictures: Pictures) -> tuple[Texture, float] | None:
+    """A normal map and its strength."""
+    statement = next((entry.maps[key] for key in _BUMPS if key in entry.maps), None)
+    if statement is None or (image := pictures.file(statement.name, plain=True)) is None:
+        return None
+    channels = image.pixels[..., :3].astype(np.float32) / (255 if image.pixels.dtype == np.uint8 else 1)
+    if float((channels.max(axis=2) - channels.min(axis=2)).mean()) < GREY:
+        return Texture(of_heights(image, HIGH), statement.scale, statement.offset), statement.strength
+    return Texture(opaque(image), statement.scale, statement.offset), statement.strength
 
 
 def _opacity(entry: Entry, pictures: Pictures, notes: Notes) -> float:

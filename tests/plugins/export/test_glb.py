@@ -31,6 +31,7 @@ from studio_core.scene.nodes import (
 )
 from studio_core.scene.transform import Transform, looking
 from studio_core.shading.materials import linear
+from studio_core.shading.normal_maps import unit_normals
 from studio_plugins.export.glb import EXPORTER
 from studio_plugins.meshes.gltf import IMPORTER
 
@@ -347,6 +348,26 @@ def test_sheen_is_written_for_cloth(host: PluginHost, parts: Any, tmp_path: Path
     assert told["sheenRoughnessFactor"] == pytest.approx(0.3)
     assert told["sheenColorTexture"] == {"index": 0}
     assert any("sheen roughness" in note for note in writer.notes)
+
+
+@pytest.mark.parametrize("strong", [1.0, 0.4, -1.5])
+@pytest.mark.parametrize("eight", [True, False])
+def test_normal_maps_come_back(
+    host: PluginHost, parts: Any, tmp_path: Path, strong: float, eight: bool
+) -> None:
+    rng = np.random.default_rng(3)
+    pixels = rng.integers(60, 256, (4, 3, 3), dtype=np.uint8)
+    pixels[..., 2] = np.maximum(pixels[..., 2], 180)
+    image = Image(pixels, "data") if eight else Image(pixels.astype(np.float32) / 255, "data")
+    texture = Texture(image, (2.0, 2.0), (0.25, 0.5), 40.0)
+    made = Material(id="m", model="ggx", values={"normal": strong}, textures={"normal": texture})
+    found, notes = round_trip(made, parts["cube"](), host, tmp_path)
+    np.testing.assert_allclose(found.textures["normal"].affine, texture.affine, atol=1e-6)
+    back = unit_normals(found.textures["normal"].image, float(found.values["normal"]))  # type: ignore[arg-type]
+    np.testing.assert_allclose(back, unit_normals(image, strong), atol=0.02)
+    assert notes == ()
+    if eight and strong > 0:
+        np.testing.assert_array_equal(found.textures["normal"].image.pixels, pixels)
 
 
 @settings(max_examples=4, suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)

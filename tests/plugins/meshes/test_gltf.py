@@ -274,6 +274,26 @@ def test_a_metallic_roughness_picture_is_one_of_each(tmp_path: Path) -> None:
     assert not any("mean" in note for note in notes)
 
 
+@pytest.mark.parametrize("scale", [None, 0.5, -2.0])
+def test_normal_maps_come_with_their_strength_and_place(tmp_path: Path, scale: float | None) -> None:
+    pixels = np.random.default_rng(1).integers(0, 256, (3, 5, 4), dtype=np.uint8)
+    made = square(material=0)
+    moved = {"KHR_texture_transform": {"scale": [2.0, 2.0], "rotation": 0.5}}
+    told = {"index": 0, "extensions": moved} | ({} if scale is None else {"scale": scale})
+    made.json |= {
+        "images": [{"bufferView": made.view(encode_png(pixels))}],
+        "textures": [{"source": 0}],
+        "materials": [{"normalTexture": told}],
+    }
+    model = load(tmp_path, made)
+    found = model.materials[0]
+    assert found.values["normal"] == (1.0 if scale is None else scale)
+    assert found.textures["normal"].image.encoding == "data"
+    np.testing.assert_array_equal(found.textures["normal"].image.pixels, pixels[..., :3])
+    assert found.textures["normal"].rotation == pytest.approx(-np.degrees(0.5))
+    assert not any("normal" in note for note in model.notes)
+
+
 def test_sixteen_bits_of_metal_and_roughness_are_plain_numbers(tmp_path: Path) -> None:
     import cv2
 

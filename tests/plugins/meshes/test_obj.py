@@ -186,11 +186,11 @@ def test_the_same_picture_is_read_once(tmp_path: Path) -> None:
 
 
 def test_what_is_missing_or_unused_is_told(tmp_path: Path) -> None:
-    made, model = material(tmp_path, "Kd 1 1 1\nKe 3 3 3\nmap_Kd no such.png\nmap_Bump -bm 0.2 bump.png\n")
+    made, model = material(tmp_path, "Kd 1 1 1\nKe 3 3 3\nmap_Kd no such.png\ndisp deep.png\n")
     assert made.textures == {}
     told = " ".join(model.notes)
     assert "'no such.png' is missing" in told
-    assert "bump map" in told
+    assert "displacement map" in told
     assert "shines by itself" in told
     (tmp_path / "model.mtl").unlink()
     text = f"mtllib model.mtl\n{SQUARE}usemtl m\nf 1 2 3 4\nv 1 1 1 1 0 0\n"
@@ -243,3 +243,28 @@ def test_a_missing_file_is_refused(tmp_path: Path) -> None:
         IMPORTER.load(tmp_path / "none.obj")
     with pytest.raises(InputError):
         IMPORTER.load(Path("a\0b.obj"))
+
+
+@pytest.mark.parametrize(("statement", "strength"), [("norm n.png", 1.0), ("map_Bump -bm 0.4 n.png", 0.4)])
+def test_coloured_bumps_are_normal_maps(tmp_path: Path, statement: str, strength: float) -> None:
+    pixels = np.random.default_rng(1).integers(0, 256, (4, 5, 3), dtype=np.uint8)
+    (tmp_path / "n.png").write_bytes(encode_png(pixels))
+    made, model = material(tmp_path, f"Kd 1 1 1\n{statement}\n")
+    assert made.values["normal"] == strength
+    assert made.textures["normal"].image.encoding == "data"
+    np.testing.assert_array_equal(made.textures["normal"].image.pixels, pixels)
+    assert not any("bump" in note or "normal" in note for note in model.notes)
+
+
+def test_grey_bumps_are_heights(tmp_path: Path) -> None:
+    """A ramp that rises along u, and one that rises along v, which is up: normals lean back from both."""
+    ramp = np.repeat(np.arange(0, 250, 25, dtype=np.uint8)[None, :, None], 10, axis=0)
+    for name, pixels in (("along.png", ramp), ("up.png", ramp.transpose(1, 0, 2)[::-1])):
+        (tmp_path / name).write_bytes(encode_png(np.ascontiguousarray(pixels.repeat(3, axis=2))))
+        made, _ = material(tmp_path, f"Kd 1 1 1\nbump -bm 2 -s 3 3 1 {name}\n")
+        found = made.textures["normal"].image.pixels[5, 5].astype(float) / 127.5 - 1
+        slope = 25 / 255 * 0.01 * 10
+        wanted = [-slope, 0] if name == "along.png" else [0, -slope]
+        np.testing.assert_allclose(found[:2] / found[2], wanted, atol=0.008)
+        assert made.values["normal"] == 2
+        assert made.textures["normal"].scale == (3.0, 3.0)

@@ -21,6 +21,7 @@ from studio_core.scene.pattern import PatternRuler
 from studio_core.shading.grown_textures import grown, lying_alike
 from studio_core.shading.job import Job
 from studio_core.shading.materials import shape_textures
+from studio_core.shading.normal_maps import NORMAL
 from studio_ui.context import Context
 from studio_ui.forms.fields import ColourField, Combo
 from studio_ui.forms.param_form import ParamForm, form_label, form_layout
@@ -36,6 +37,12 @@ if TYPE_CHECKING:
     from studio_core.brdfs.fitting import Fit
 
 _COMMON: Mapping[str, ParamInfo] = param_infos(Material)
+_BUMPS: Mapping[str, ParamInfo] = {
+    NORMAL: ParamInfo(
+        "number", "Strength", "How steep the normal map's bumps are; below 0 they are dents",
+        low=-3.0, high=3.0,
+    )
+}  # fmt: skip
 PICTURES = "Pictures (*.png *.jpg *.jpeg *.exr *.hdr *.tif *.tiff)"
 
 
@@ -46,6 +53,7 @@ class MaterialForm(QWidget):
         super().__init__()
         self.materials: tuple[MaterialId, ...] = ()
         self.form: ParamForm | None = None
+        self.bumps: ParamForm | None = None
         self.common: ParamForm | None = None
         self.kind = Combo()
         self.kinds: list[str] = []
@@ -86,6 +94,9 @@ class MaterialForm(QWidget):
             every = [{**usual, **material.values} for material in materials]
             mixed = {n for n in usual if any(one[n] != every[-1][n] for one in every)}
             self.form.show_values(every[-1], mixed)
+        if self.bumps is not None:
+            self.bumps.show_values({NORMAL: last.values.get(NORMAL, 1.0)}, set())
+            self.bumps.setVisible(NORMAL in last.textures)
         laid = last.textures and (self.textures or self.maps is not None)
         lengths = self._ruler.lengths(scene, last.id) if laid else None
         if self.maps is not None:
@@ -97,12 +108,12 @@ class MaterialForm(QWidget):
 
     def load_picture(self, name: str, path: Path) -> None:
         """Read a picture away from the window's thread, then lay it on the surface."""
-        materials = self.materials
+        materials, plain = self.materials, name == NORMAL
 
         def read(job: Job) -> Image:
             from studio_core.imaging.io import read_image
 
-            return read_image(path)
+            return read_image(path, plain=plain)
 
         def done(image: Image) -> None:
             there = [m for m in materials if m in self._context.document.scene.materials]
@@ -129,7 +140,7 @@ class MaterialForm(QWidget):
     def _build(self, materials: list[Material], model: Brdf | None) -> None:
         self._sink.commit()  # a slider that is held goes with its form
         clear(self._column)
-        self.form = self.common = None
+        self.form = self.common = self.bumps = None
         self.textures = {}
         self.maps = self.measurement = None
         if not materials:
@@ -158,6 +169,11 @@ class MaterialForm(QWidget):
                 names = ()
             for name in names:
                 self._column.addWidget(self._texture(materials[0].id, name, infos[name].label))
+            if len(materials) == 1 and self.maps is None:
+                told = "A picture of which way the surface is turned at each spot, green up as glTF has it"
+                self._column.addWidget(self._texture(materials[0].id, NORMAL, "Normal", told))
+                self.bumps = ParamForm(_BUMPS, self._sink, defaults={NORMAL: 1.0})
+                self._column.addWidget(self.bumps)
         elif not self._context.warm:
             self._column.addWidget(note("Loading…"))
         elif len({material.model for material in materials}) == 1:
@@ -182,7 +198,7 @@ class MaterialForm(QWidget):
         layout.addRow(form_label("Kind", "How the surface reflects light"), self.kind)
         return box
 
-    def _texture(self, material: MaterialId, name: str, label: str) -> QWidget:
+    def _texture(self, material: MaterialId, name: str, label: str, told: str = "") -> QWidget:
         box = QWidget()
         layout = form_layout(box)
         made = TextureRow(
@@ -192,9 +208,10 @@ class MaterialForm(QWidget):
             lambda texture: self._put_texture(material, name, texture),
             lambda texture: self._lay(material, name, texture),
             lambda times: self.grow_pictures(material, name, times),
+            told,
         )
         self.textures[name] = made
-        layout.addRow(form_label(f"{label} map", "A picture that the value is multiplied with"), made)
+        layout.addRow(form_label(f"{label} map", told or "A picture that the value is multiplied with"), made)
         layout.addRow(made.pattern)
         return box
 
@@ -259,7 +276,7 @@ class MaterialForm(QWidget):
         scene = self._context.document.scene
         there = [scene.material(m) for m in self.materials if m in scene.materials]
         model = self._brdf(there[-1].model)
-        infos = {**(param_infos(model.Params) if model is not None else {}), **_COMMON}
+        infos = {**(param_infos(model.Params) if model is not None else {}), **_COMMON, **_BUMPS}
         what = there[0].name if len(there) == 1 else f"{len(there)} materials"
         return f"{infos[name].label if name in infos else name} of {what}"
 
@@ -298,7 +315,8 @@ class MaterialForm(QWidget):
         for chosen in self.materials:
             material = scene.material(chosen)
             if material.model != name:
-                kept = {n: material.values[n] for n in param_infos(model.Params) if n in material.values}
+                names = (*param_infos(model.Params), NORMAL)
+                kept = {n: material.values[n] for n in names if n in material.values}
                 edits.append(SetMaterial(chosen, kept, model=name))
         if edits:
             what = scene.material(self.materials[0]).name

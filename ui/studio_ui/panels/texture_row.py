@@ -33,13 +33,14 @@ class TextureRow(QWidget):
         put: Callable[[Texture | None], object],
         lay: Callable[[Texture], object],
         grow: Callable[[int], object],
+        told: str = "",
     ) -> None:
         super().__init__()
         self._texture: Texture | None = None
         self.picture = QLabel()
         self.text = QLabel()
         self.text.setProperty("role", "dim")
-        load = tool("open", f"Picture for {label.lower()}, which it is multiplied with")
+        load = tool("open", told or f"Picture for {label.lower()}, which it is multiplied with")
         load.clicked.connect(lambda: ask())
         self.remove = tool("cancel", "Take the picture away")
         self.remove.clicked.connect(lambda: put(None))
