@@ -54,6 +54,8 @@ class Layout:
         for tabs in window.findChildren(QTabBar):
             tabs.setElideMode(Qt.TextElideMode.ElideNone)
             tabs.setUsesScrollButtons(False)
+            tabs.setAcceptDrops(True)
+            tabs.setChangeCurrentOnDrag(True)  # a material is on its way from one panel to another
             tabs.setAccessibleName("Panels")
         window.resizeDocks([docks["outliner"], docks["history"]], [560, 260], Qt.Orientation.Vertical)
         sides = [docks["outliner"], docks["properties"]]

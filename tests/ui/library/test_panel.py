@@ -134,15 +134,17 @@ def test_it_is_dragged_onto_an_object(driver: Driver, panel: LibraryPanel) -> No
     assert not Drag(driver, data).over(on_canvas(driver, (0.0, 0.0, 3.0))), "nothing is there to have it"
 
 
-def _drop(widget: QAbstractItemView, data: QMimeData) -> bool:
-    """Let go over a list; whether it took it."""
+def _drop(widget: QAbstractItemView, data: QMimeData, at: QPoint | None = None) -> bool:
+    """Let go over a list; whether it took it while it hung there."""
     copy, left = Qt.DropAction.CopyAction, Qt.MouseButton.LeftButton
+    place, taken = at or QPoint(20, 20), []
     for kind in (QDragEnterEvent, QDragMoveEvent, QDropEvent):
-        at = QPoint(20, 20) if kind is not QDropEvent else QPointF(20, 20)
-        event = kind(at, copy, data, left, Qt.KeyboardModifier.NoModifier)
+        where = place if kind is not QDropEvent else QPointF(place)
+        event = kind(where, copy, data, left, Qt.KeyboardModifier.NoModifier)
         event.setAccepted(False)
         QApplication.sendEvent(widget.viewport(), event)
-    return event.isAccepted()
+        taken.append(event.isAccepted())
+    return all(taken[:2])
 
 
 def test_it_is_dragged_into_the_list_and_the_outliner(driver: Driver, panel: LibraryPanel) -> None:
@@ -151,10 +153,17 @@ def test_it_is_dragged_into_the_list_and_the_outliner(driver: Driver, panel: Lib
     materials, outliner = driver.window.panels["materials"], driver.window.panels["outliner"]
     assert _drop(materials.list, entry_data(key))
     driver.until(lambda: driver.labels()[-1] == "Add Copper, polished")
-    outliner.model.dropMimeData(entry_data(key), Qt.DropAction.CopyAction, -1, 0, outliner.model.of("seat"))
-    scene = driver.document.scene
-    assert scene.material(scene["seat"].materials[0]).name == "Copper, polished"
-    assert driver.labels()[-1] == "Copper, polished on Seat"
+    driver.window.layout_.show("outliner")
+    tree = outliner.tree
+    tree.expandAll()
+    for data, label in (
+        (entry_data(key), "Copper, polished on Seat"),
+        (material_data("blue"), "Blue on Seat"),
+    ):
+        at = tree.visualRect(outliner.proxy.mapFromSource(outliner.model.of("seat"))).center()
+        assert _drop(tree, data, at)
+        driver.until(lambda label=label: driver.labels()[-1] == label)
+    assert driver.document.scene["seat"].materials == ("blue",)
 
 
 def test_a_material_of_the_scene_is_kept_changed_and_thrown_away(

@@ -15,7 +15,7 @@ from studio_core.scene.nodes import Camera, Environment, Node, NodeId, Scene
 from studio_ui.editing import Editing
 from studio_ui.look.icons import icon
 from studio_ui.look.theme import DARK, Theme
-from studio_ui.objects.material_drag import assigned, dragged_entry, dragged_material
+from studio_ui.objects.material_drag import LIBRARY_MIME, MIME, assigned, dragged_entry, dragged_material
 from studio_ui.panels.node_kinds import kind_icon, kind_name
 
 Index = QModelIndex | QPersistentModelIndex
@@ -253,8 +253,8 @@ class OutlinerModel(QAbstractItemModel):
         return Qt.DropAction.MoveAction
 
     def mimeTypes(self) -> list[str]:
-        """Node ids."""
-        return [_MIME]
+        """What can be dropped: nodes, materials of the scene and of the library. Nodes are dragged."""
+        return [_MIME, MIME, LIBRARY_MIME]
 
     def mimeData(self, indexes: Sequence[QModelIndex]) -> QMimeData:
         """The dragged nodes' ids."""
