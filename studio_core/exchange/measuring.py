@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -12,9 +13,11 @@ from studio_core.brdfs.samples import LOWEST, Difference, Samples, difference
 from studio_core.exchange.reflectance import reflectance
 from studio_core.exchange.surface import Surface
 from studio_core.kernels.pairs import evaluate_pairs
+from studio_core.scene.geometry import Texture
 from studio_core.shading.materials import Resolved, coefficients, finite_shape
 
 F64 = npt.NDArray[np.float64]
+MOST_TEXELS = 1 << 18
 _HALVES, _DIFFERENCES, _AZIMUTHS, _TURNS = 24, 8, 5, 4
 
 
@@ -28,8 +31,11 @@ class Flat:
 
     @classmethod
     def of(cls, resolved: Resolved) -> Flat:
-        """Coefficients are averaged, not the parameters that they are made of."""
-        made = coefficients(resolved).astype(np.float64)
+        """Coefficients are averaged, not the parameters that they are made of; over every n-th texel each way
+        of pictures that have more than 2^18.
+        """
+        thin = {name: _thinned(texture) for name, texture in resolved.textures.items()}
+        made = coefficients(replace(resolved, textures=thin)).astype(np.float64)
         shape = finite_shape(resolved.brdf, resolved.typical())
         return cls(resolved, shape, made.reshape(-1, *made.shape[-2:]).mean(axis=0))
 
@@ -65,6 +71,16 @@ def between(made: Resolved, meant: Resolved) -> float:
 def distance(surface: Surface, samples: Samples) -> Difference:
     """How far the surface, by the letter of its formats, is from what was sampled."""
     return difference(reflectance(surface, samples.wi, samples.wo), samples)
+
+
+def _thinned(texture: Texture) -> Texture:
+    pixels = texture.image.pixels
+    step = max(math.ceil(math.sqrt(pixels[..., 0].size / MOST_TEXELS)), 1)
+    return (
+        texture
+        if step == 1
+        else replace(texture, image=replace(texture.image, pixels=pixels[::step, ::step]))
+    )
 
 
 def _turned(v: F64, angle: F64) -> F64:

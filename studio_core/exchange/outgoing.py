@@ -27,6 +27,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from studio_core.arrays import frozen_map
 from studio_core.brdfs.albedo import term_albedo
@@ -42,9 +43,11 @@ from studio_core.shading.materials import Resolved, coefficients, first_channel,
 from studio_core.shading.normal_maps import normal_texture, strength
 
 _NARROWER = ("ward", "ashikhmin-shirley")
+F32 = npt.NDArray[np.float32]
 SAME = 5e-4  # of the metric: nobody sees it
 NO_MATTE = 0.02  # albedo under which a material with a highlight counts as metal
 HIGHEST_F0 = 0.08
+BAND = 128
 GLOSSY_GROUND = 1
 
 
@@ -163,7 +166,7 @@ def _plastic(resolved: Resolved, notes: list[str]) -> Surface:
     textures = dict(_laid(resolved, specular="gloss", roughness="roughness"))
     base: Colour = WHITE
     if "base_color" in resolved.textures:
-        ground = coefficients(resolved)[::-1, :, GLOSSY_GROUND]
+        ground = _by_texel(resolved, lambda made: made[..., GLOSSY_GROUND, :])
         textures["base_color"] = _picture(ground, resolved.textures["base_color"])
     else:
         base = _colour(Flat.of(resolved).colours[GLOSSY_GROUND])
@@ -237,10 +240,27 @@ def _fitted(resolved: Resolved, flat: Flat, samples: Samples) -> Surface:
     if not resolved.textures:
         return made
     first = next(iter(resolved.textures.values()))
-    albedo = np.maximum(np.einsum("hwkc,k->hwc", coefficients(resolved)[::-1], _mean_terms(flat)), 0)
-    mean = albedo.mean(axis=(0, 1))
-    picture = _picture(albedo * (np.asarray(base) / np.maximum(mean, 1e-6)), first)
+    shares = _mean_terms(flat).astype(np.float32)
+    albedo = _by_texel(resolved, lambda made: np.maximum(np.einsum("hwkc,k->hwc", made, shares), 0))
+    mean = albedo.mean(axis=(0, 1), dtype=np.float64)
+    gain = (np.asarray(base) / np.maximum(mean, 1e-6)).astype(np.float32)
+    picture = _picture(albedo * gain, first)
     return replace(made, base_color=WHITE, textures=frozen_map({**made.textures, "base_color": picture}))
+
+
+def _by_texel(resolved: Resolved, what: Callable[[F32], F32]) -> F32:
+    """(H, W, 3) of the coefficients (rows, W, T, 3), rows from the top; by bands where pictures are alike."""
+    sizes = {texture.image.pixels.shape[:2] for texture in resolved.textures.values()}
+    if len(sizes) > 1:
+        return what(coefficients(resolved)[::-1])
+    made = []
+    for top in range(0, next(iter(sizes))[0], BAND):
+        cut = {
+            name: replace(t, image=replace(t.image, pixels=t.image.pixels[top : top + BAND]))
+            for name, t in resolved.textures.items()
+        }
+        made.append(what(coefficients(replace(resolved, textures=cut))[::-1]))
+    return np.concatenate(made)
 
 
 def _mean_terms(flat: Flat) -> Any:

@@ -129,6 +129,21 @@ def test_pictures_go_out_as_they_are_or_as_what_they_do() -> None:
     assert made.textures["base_color"].affine == picture.affine
 
 
+def test_large_pictures_are_worked_on_in_bands() -> None:
+    rows = np.linspace(0, 1, 700, dtype=np.float32)[:, None, None] * np.ones((1, 3, 3), np.float32)
+    picture = Texture(Image(rows))
+    glossy = material("plastic", {"base_color": picture}, base_color=(1.0,) * 3, depth=0.0)
+    found = surface_of(glossy, HOST).surface.textures["base_color"].image.pixels
+    np.testing.assert_allclose(found, rows, atol=1e-6)
+    small = Texture(Image(np.ones((2, 2, 1), np.float32)))
+    both = material("plastic", {"base_color": picture, "gloss": small}, base_color=(1.0,) * 3, depth=0.0)
+    found = surface_of(both, HOST).surface.textures["base_color"].image.pixels
+    np.testing.assert_allclose(found, rows, atol=1e-6)
+    wide = Texture(Image(np.full((700, 800, 3), 0.25, np.float32)))
+    flat = Flat.of(resolve(material("lambert", {"base_color": wide}, base_color=(1.0,) * 3), HOST))
+    np.testing.assert_allclose(flat.colours, 0.25 / np.pi, rtol=1e-6)
+
+
 def test_an_unknown_model_is_fitted_and_keeps_its_picture(monkeypatch: pytest.MonkeyPatch) -> None:
     import studio_core.exchange.outgoing as outgoing
 

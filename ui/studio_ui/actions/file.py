@@ -32,6 +32,8 @@ ITEMS: tuple[Item, ...] = (
                "Numbered pictures for a film", enabled="picture"),
     ActionSpec("file.export_glb", "Export scene as GLB…", "File", "",
                "For other programs; materials become metallic-roughness"),
+    ActionSpec("file.export_materialx", "Export materials as MaterialX…", "File", "",
+               "All materials of the scene, with their pictures, for other programs"),
     ActionSpec("file.export_mitsuba", "Export scene for Mitsuba…", "File", "",
                "A folder with the scene, to render it exactly"),
     SEPARATOR,

@@ -36,6 +36,7 @@ class Transfer:
         return {
             "file.environment": self.load_environment,
             "file.export_glb": lambda: self.export_scene("glb", self._beside(".glb")),
+            "file.export_materialx": lambda: self.export_scene("materialx", self._beside(".mtlx")),
             "file.export_mitsuba": lambda: self.export_scene("mitsuba", self._beside("")),
         }
 
