@@ -21,11 +21,13 @@ import numpy.typing as npt
 from studio_core.brdfs.calls import evaluate
 from studio_core.contract import Brdf, Registry
 from studio_core.preview.fan import DIRECTIONS, Fan, fan
+from studio_core.preview.leaning import leaning
 from studio_core.preview.light import PreviewLight
 from studio_core.preview.sphere import Sphere, disc, over_disc, sphere
 from studio_core.scene.geometry import Image, Texture
 from studio_core.scene.nodes import Material
 from studio_core.shading.materials import Resolved, linear_rgb, resolve
+from studio_core.shading.normal_maps import normal_texture, strength, unit_normals
 
 F32 = npt.NDArray[np.float32]
 T = TypeVar("T")
@@ -85,6 +87,10 @@ class Balls:
         key = (light.key, size, resolved.brdf, shape.tobytes())
         terms = self._terms.get(key, lambda: self._sum(resolved.brdf, shape, light, size))
         at = disc(size, *_COARSE)  # whatever rings there were: pixels and their places are the same
+        bumps = normal_texture(material)
+        if bumps is not None:
+            normals = self._normals(bumps, strength(material), at.uv)
+            terms = leaning(terms, size, at, normals, bumps)
         summed = np.einsum("pkc,pkc->pc", terms, self._coefficients(resolved, at.uv), optimize=False)
         colour = np.maximum(summed, 0)  # captured materials have coefficients below 0
         made = np.zeros((size, size, 4), np.float32)
@@ -175,17 +181,29 @@ class Balls:
 
     def _texels(self, texture: Texture, uv: F32) -> F32:
         """(P, 3) of the picture made small, between its texels."""
-        small = self._small(texture.image)
-        height, width = small.shape[:2]
-        place = texture.placed(uv)
-        x, y = place[:, 0] * width - 0.5, place[:, 1] * height - 0.5
-        left, low = np.floor(x), np.floor(y)
-        across, up = (x - left)[:, None].astype(np.float32), (y - low)[:, None].astype(np.float32)
-        x0, y0 = left.astype(np.int64) % width, low.astype(np.int64) % height
-        x1, y1 = (x0 + 1) % width, (y0 + 1) % height
-        lower = small[y0, x0] * (1 - across) + small[y0, x1] * across
-        upper = small[y1, x0] * (1 - across) + small[y1, x1] * across
-        return np.asarray(lower * (1 - up) + upper * up, np.float32)
+        return _between(self._small(texture.image), texture, uv)
+
+    def _normals(self, texture: Texture, strong: float, uv: F32) -> F32:
+        """(P, 3) unit normals in the frame of a normal map made small."""
+        image = texture.image
+        key = f"normals {image.key}"
+        small = self._textures.get(key, lambda: _shrunk(unit_normals(image)))
+        made = _between(small, texture, uv) * np.array([strong, strong, 1], np.float32)
+        return np.asarray(made / np.linalg.norm(made, axis=1, keepdims=True), np.float32)
+
+
+def _between(small: F32, texture: Texture, uv: F32) -> F32:
+    """(P, 3) between texels (h, w, 3), rows from v = 0 up, of a picture as it lies."""
+    height, width = small.shape[:2]
+    place = texture.placed(uv)
+    x, y = place[:, 0] * width - 0.5, place[:, 1] * height - 0.5
+    left, low = np.floor(x), np.floor(y)
+    across, up = (x - left)[:, None].astype(np.float32), (y - low)[:, None].astype(np.float32)
+    x0, y0 = left.astype(np.int64) % width, low.astype(np.int64) % height
+    x1, y1 = (x0 + 1) % width, (y0 + 1) % height
+    lower = small[y0, x0] * (1 - across) + small[y0, x1] * across
+    upper = small[y1, x0] * (1 - across) + small[y1, x1] * across
+    return np.asarray(lower * (1 - up) + upper * up, np.float32)
 
 
 def ball(
@@ -225,7 +243,11 @@ def _fine(size: int) -> tuple[int, int]:
 
 def _small(image: Image) -> F32:
     """(h, w, 3) scene-linear, rows from v = 0 up."""
-    pixels = linear_rgb(image)
+    return _shrunk(linear_rgb(image))
+
+
+def _shrunk(pixels: F32) -> F32:
+    """The same of pixels, rows from the top."""
     height, width = pixels.shape[:2]
     if max(height, width) > _TEXELS:
         from studio_core.imaging.resample import resize_area

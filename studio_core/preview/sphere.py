@@ -16,8 +16,9 @@ I64 = npt.NDArray[np.int64]
 _TILT = math.radians(14)  # the ball is seen a little from above
 VIEW: F64 = np.array([0.0, math.sin(_TILT), math.cos(_TILT)])
 """Towards the eye, far away: it looks along -z, as cameras do."""
-_RIGHT: F64 = np.array([1.0, 0.0, 0.0])
-_UP: F64 = np.cross(VIEW, _RIGHT)
+RIGHT: F64 = np.array([1.0, 0.0, 0.0])
+UP: F64 = np.cross(VIEW, RIGHT)
+"""With `RIGHT` the axes of the picture, in the world."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,12 +56,12 @@ def sphere(rings: int, turns: int) -> Sphere:
     angle = (np.arange(rings) + 0.5) / rings * np.pi / 2
     turn = 2 * np.pi * np.arange(turns) / turns
     cosine, sine = np.cos(angle)[:, None, None], np.sin(angle)[:, None, None]
-    outward = np.cos(turn)[:, None] * _RIGHT + np.sin(turn)[:, None] * _UP
+    outward = np.cos(turn)[:, None] * RIGHT + np.sin(turn)[:, None] * UP
     normal = cosine * VIEW + sine * outward
     first = sine * VIEW - cosine * outward  # the view less its part along the normal
     second = np.cross(normal, first)
     frames = np.stack([first, second, normal], axis=2)
-    tangent = _along_u(normal)
+    tangent = along_u(normal)
     grain = np.arctan2((tangent * second).sum(axis=2), (tangent * first).sum(axis=2))
     return Sphere(np.cos(angle), frames.astype(np.float32), grain.astype(np.float32))
 
@@ -78,7 +79,7 @@ def disc(size: int, rings: int, turns: int) -> Disc:
     within = np.minimum(distance, 1.0)
     stretch = within / np.maximum(distance, 1e-12)
     x, y = x * stretch, y * stretch
-    normal = x[:, None] * _RIGHT + y[:, None] * _UP + np.sqrt(1 - within**2)[:, None] * VIEW
+    normal = x[:, None] * RIGHT + y[:, None] * UP + np.sqrt(1 - within**2)[:, None] * VIEW
     uv = np.stack(
         [np.arctan2(normal[:, 0], normal[:, 2]) / np.pi, np.arcsin(np.clip(normal[:, 1], -1, 1)) / np.pi], 1
     )  # a turn around is twice as long as the way from pole to pole
@@ -105,11 +106,18 @@ def over_disc(points: F32, at: Disc) -> F32:
     return np.asarray(made.reshape(-1, *points.shape[2:]))
 
 
-def _along_u(normal: F64) -> F64:
+def normals_of(at: Disc) -> F64:
+    """(P, 3) unit normals of the pixels, in the world."""
+    around = (at.uv[:, 0].astype(np.float64) - 0.5) * np.pi
+    high = (at.uv[:, 1].astype(np.float64) - 0.5) * np.pi
+    return np.stack([np.sin(around) * np.cos(high), np.sin(high), np.cos(around) * np.cos(high)], axis=1)
+
+
+def along_u(normal: F64) -> F64:
     """Tangents in the direction of rising u: eastward. At the poles any."""
     east = np.stack([normal[..., 2], np.zeros(normal.shape[:-1]), -normal[..., 0]], axis=-1)
     length = np.linalg.norm(east, axis=-1, keepdims=True)
-    return np.where(length > 1e-9, east / np.maximum(length, 1e-9), _RIGHT)
+    return np.where(length > 1e-9, east / np.maximum(length, 1e-9), RIGHT)
 
 
-__all__ = ["VIEW", "Disc", "Sphere", "disc", "over_disc", "sphere"]
+__all__ = ["RIGHT", "UP", "VIEW", "Disc", "Sphere", "along_u", "disc", "normals_of", "over_disc", "sphere"]

@@ -14,7 +14,7 @@ from studio_core.imaging.latlong import pixel_directions, pixel_solid_angles
 from studio_core.params import param
 from studio_core.preview.ball import Balls, ball
 from studio_core.preview.light import environment_light
-from studio_core.preview.sphere import VIEW, disc, over_disc, sphere
+from studio_core.preview.sphere import VIEW, along_u, disc, normals_of, over_disc, sphere
 from studio_core.registry import PluginHost
 from studio_core.scene.geometry import Image, Texture
 from studio_core.scene.nodes import Environment, Material
@@ -226,3 +226,34 @@ def test_points_and_pixels_agree() -> None:
     x, y = (at.columns + 0.5 - 20) / 19.5, -(at.rows + 0.5 - 20) / 19.5
     inside = np.hypot(x, y) < 0.95
     np.testing.assert_allclose(between[inside, 0], x[inside], atol=0.02)
+
+
+@pytest.mark.parametrize("rotation", [0.0, 70.0])
+@pytest.mark.parametrize("model", ["lambert", "ggx"])
+def test_a_map_that_leans_one_way_shows_what_such_normals_see(model: str, rotation: float) -> None:
+    """Against brute force at the leaning normals themselves; a flat map changes nothing."""
+    lean = np.array([0.35, -0.2, 1.0]) / np.linalg.norm([0.35, -0.2, 1.0])
+    texels = np.tile(((lean + 1) / 2).astype(np.float32), (4, 4, 1))
+    texture = Texture(Image(texels, "data"), rotation=rotation)
+    values: dict[str, Any] = {} if model == "lambert" else {"roughness": 0.6}
+    light = environment_light(environment(sky()))
+    flat = ball(material(model, **values), light, SIZE, HOST).pixels
+    bumpy = ball(material(model, textures={"normal": texture}, **values), light, SIZE, HOST).pixels
+    at = disc(SIZE, 20, 40)
+    normals = normals_of(at)
+    angle = np.radians(rotation)
+    x = np.cos(angle) * lean[0] - np.sin(angle) * lean[1]
+    y = np.sin(angle) * lean[0] + np.cos(angle) * lean[1]
+    east = along_u(normals)
+    turned = x * east + y * np.cross(normals, east) + lean[2] * normals
+    inner = np.flatnonzero((at.coverage == 1) & (turned @ VIEW > 0.4))
+    some = np.random.default_rng(2).choice(inner, 12, replace=False)
+    for p in some:
+        wanted = brute_force(material(model, **values), sky(), turned[p])
+        np.testing.assert_allclose(bumpy[at.rows[p], at.columns[p], :3], wanted, rtol=0.06)
+    assert np.abs(bumpy - flat)[at.rows[inner], at.columns[inner]].mean() > 0.03 * flat.mean()
+    plain = Texture(Image(np.full((4, 4, 3), (0.5, 0.5, 1.0), np.float32), "data"))
+    same = ball(material(model, textures={"normal": plain}, **values), light, SIZE, HOST).pixels
+    np.testing.assert_allclose(
+        same[at.rows[inner], at.columns[inner]], flat[at.rows[inner], at.columns[inner]], rtol=1e-3
+    )
