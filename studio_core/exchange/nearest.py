@@ -33,11 +33,16 @@ def fitted(samples: Samples) -> Surface:
     return min(found, key=lambda one: one[0])[1]
 
 
-def rescaled(made: Surface, samples: Samples) -> Surface:
-    """With the width of the highlight at which it comes nearest, all else as it is."""
+def rescaled(made: Surface, samples: Samples, flattest: float = 0.0) -> Surface:
+    """With the width of the highlight at which it comes nearest, all else as it is.
+
+    `flattest`: cosine of the flattest directions that count.
+    """
     from scipy.optimize import minimize_scalar
 
-    some = samples.some(2 * MOST_SAMPLES)
+    rows = (samples.wi[:, 2] > flattest) & (samples.wo[:, 2] > flattest)
+    kept = Samples(samples.wi[rows], samples.wo[rows], samples.values[rows], samples.weight[rows])
+    some = kept.some(2 * MOST_SAMPLES)
 
     def scaled(power: float) -> Surface:
         along, across = made.alphas

@@ -10,10 +10,11 @@ ggx-dielectric     black with its index and the tint as the reflection's colour
 plastic            the light its ground sends back as base colour (depth included), under its index; gloss
                    as the reflection's weight
 cloth              matte with a sheen
-phong,             roughness = √α with α² = 2 / (4n + 2); blinn-phong α² = 2 / (n + 2). Highlight colours
-blinn-phong        become F0 of a dielectric, or a metal where there is no matte part
-ward,              the same with the α along and across the grain (α² = 2 / (n + 2) of both exponents).
-ashikhmin-shirley  As metals they have the width at which GGX, of longer tails, comes nearest
+phong,             roughness = √α with α² = 2 / (4n + 2); blinn-phong α² = 2 / (n + 2); then the width at
+blinn-phong        which GGX, of longer tails, comes nearest up to 60°. Highlight colours become F0 of a
+                   dielectric, or a metal where there is no matte part
+ward,              the same with the α along and across the grain (α² = 2 / (n + 2) of both exponents);
+ashikhmin-shirley  metals have the width that is nearest at all angles
 any other          fitted (`nearest`); a picture of how much light each texel returns
 =================  ==================================================================================
 
@@ -42,7 +43,8 @@ from studio_core.scene.nodes import Material
 from studio_core.shading.materials import Resolved, coefficients, first_channel, resolve
 from studio_core.shading.normal_maps import normal_texture, strength
 
-_NARROWER = ("ward", "ashikhmin-shirley")
+COMMON = 0.5  # cosine of the flattest directions by which Phong's highlights are compared: theirs don't
+# grow towards grazing angles, as those of facets do, and would become far too wide head-on
 F32 = npt.NDArray[np.float32]
 SAME = 5e-4  # of the metric: nobody sees it
 NO_MATTE = 0.02  # albedo under which a material with a highlight counts as metal
@@ -81,7 +83,9 @@ def surface_of(material: Material, registry: Registry) -> Outgoing:
     samples = None if exact else flat.samples()
     if samples is None or model in _KNOWN:
         made = _KNOWN[model](resolved, notes)
-        if samples is not None and model in _NARROWER and made.metallic > 0:
+        if samples is not None and model in ("phong", "blinn-phong"):
+            made = rescaled(made, samples, COMMON)
+        elif samples is not None and _KNOWN[model] is _highlight and made.metallic > 0:
             made = rescaled(made, samples)
     else:
         made = _fitted(resolved, flat, samples)

@@ -49,7 +49,7 @@ def test_presets_have_near_surfaces() -> None:
     ("made", "most"),
     [
         (material("ward", diffuse=(0.0,) * 3, specular=(0.9, 0.8, 0.7), roughness=0.4, anisotropy=0.8), 0.13),
-        (material("blinn-phong", diffuse=(0.5, 0.3, 0.2), specular=(0.04,) * 3, exponent=200.0), 0.3),
+        (material("blinn-phong", diffuse=(0.5, 0.3, 0.2), specular=(0.04,) * 3, exponent=200.0), 0.2),
         (
             material("ggx-conductor", base_color=(0.9, 0.6, 0.3), edge_tint=(0.5, 0.8, 1.0), roughness=0.2),
             0.02,
