@@ -42,6 +42,7 @@ class Graph:
 
     def __init__(self, document: Any, say: Callable[[str], object]) -> None:
         self.document, self._say = document, say
+        self._known: dict[tuple[str, str], Found | None] = {}  # None while a node is being followed
 
     def input(self, node: Any, name: str) -> Found | None:
         """What a node's input is, None where the file doesn't tell or it cannot be followed."""
@@ -93,6 +94,14 @@ class Graph:
         return self._node(node, port.getOutputString(), scope, depth)
 
     def _node(self, node: Any, output: str, scope: Any, depth: int) -> Found | None:
+        """What a node gives; each is followed once, however many lead to it."""
+        key = (str(node.getNamePath()), output)
+        if key not in self._known:
+            self._known[key] = None
+            self._known[key] = self._followed(node, output, scope, depth)
+        return self._known[key]
+
+    def _followed(self, node: Any, output: str, scope: Any, depth: int) -> Found | None:
         kind = node.getCategory()
 
         def get(name: str) -> Found | None:

@@ -36,6 +36,8 @@ class MaterialXImporter:
         found = _shaders(document)
         if not found:
             raise InputError(f"{path} cannot be imported: it holds no material")
+        if len(found) > MOST_MATERIALS:
+            say(f"Of {len(found)} materials the first {MOST_MATERIALS} are read.")
         graph, made = Graph(document, say), []
         with Pictures(path, say) as pictures:
             for name, node in found[:MOST_MATERIALS]:

@@ -211,7 +211,23 @@ def test_circles_end(tmp_path: Path) -> None:
         for a, b in (("i", "j"), ("j", "i"))
     )
     model = load(tmp_path, turn + shader("gltf_pbr", base_color='type="color3" nodename="i"'))
-    assert any("circles" in note for note in model.notes)
+    assert model.materials[0].values["base_color"] == (1.0, 1.0, 1.0)
+
+
+def test_long_chains_end_and_doubling_ones_are_followed_once(tmp_path: Path) -> None:
+    def chain(links: int, second: str) -> str:
+        made = ['<constant name="n0" type="float"><input name="value" type="float" value="1"/></constant>']
+        for n in range(links):
+            inputs = f'<input name="in1" type="float" nodename="n{n}"/>' + second.format(n)
+            made.append(f'<multiply name="n{n + 1}" type="float">{inputs}</multiply>')
+        return "".join(made)
+
+    doubling = chain(25, '<input name="in2" type="float" nodename="n{}"/>')
+    model = load(tmp_path, doubling + shader("standard_surface", metalness='type="float" nodename="n25"'))
+    assert model.materials[0].values["metallic"] == 1.0
+    long = chain(500, "")
+    model = load(tmp_path, long + shader("standard_surface", metalness='type="float" nodename="n500"'))
+    assert any("too deep" in note for note in model.notes)
 
 
 def test_old_files_are_brought_up_to_date(tmp_path: Path) -> None:
