@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -145,7 +146,7 @@ def _photographs(options: argparse.Namespace, program: Headless) -> Source:
     if options.flat:
         return Source(flat_samples(pictures, options.size, mask, distance), found, pictures.notes)
     given = _numbers("--ball", options.ball)
-    return _on_ball(pictures, mask, given, distance, options.size, found)
+    return _on_ball(pictures, mask, given, distance, options, found)
 
 
 def _on_ball(
@@ -153,10 +154,11 @@ def _on_ball(
     mask: Flags | None,
     given: tuple[float, float, float] | None,
     distance: float,
-    size: int,
+    options: argparse.Namespace,
     found: dict[str, Any],
 ) -> Source:
     from studio_plugins.residual.ball import find_ball
+    from studio_plugins.residual.light_check import checked
     from studio_plugins.residual.reflectance_map import reflectance_maps
 
     factor = pictures.factor
@@ -165,14 +167,20 @@ def _on_ball(
     else:
         seen = find_ball(pictures.light, distance, mask)
         ball, spread = seen.ball, seen.spread
-    samples = reflectance_maps(pictures.light, pictures.clipped, ball, pictures.lights, size)
+    lights, notes = pictures.lights, pictures.notes
+    if not options.no_refine:
+        told = checked(pictures.light, pictures.clipped, ball, lights)
+        ball, lights, notes = told.ball, told.lights, (*notes, *told.notes)
+        found["notes"] = list(notes)
+    samples = reflectance_maps(pictures.light, pictures.clipped, ball, lights, options.size)
     found["ball"] = {
         "x": ball.x * factor,
         "y": ball.y * factor,
         "radius": ball.radius * factor,
         "spread": spread * factor,
+        "distance": ball.distance if math.isfinite(ball.distance) else None,
     }
-    return Source(samples, found, pictures.notes)
+    return Source(samples, found, notes)
 
 
 def _balanced(pictures: Pictures, options: argparse.Namespace, found: dict[str, Any]) -> Pictures:

@@ -7,7 +7,7 @@ window.
 - what is known: `samples` (lights, ball, samples), `lights` (tables, `.lp` files, mirror ball), `names`
   (what a set of file names tells), `folder` (what belongs together)
 - from pictures: `brackets` (exposures become light), `pictures` (a folder's light), `ball` (where the sphere
-  is, to a fraction of a pixel), `reflectance_map`, `flat`
+  is, to a fraction of a pixel), `light_check` (sides, camera), `reflectance_map`, `flat`
 - BTFs: `btf` (what one is), `btf_pictures` (folders, zip files), `btf_factored` (`.btf` files), `btf_solve`
   (least squares that grow with the pictures), `btf_fit`
 - the fit: `parametric` (f_r), `bases` (δ*), `tables` (what all texels share), `masks`, `solve` (rank-aware,
