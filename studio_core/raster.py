@@ -11,6 +11,7 @@ arrives there over what arrived when it was taken.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from typing import Any, NamedTuple
@@ -33,7 +34,7 @@ from studio_core.kernels.facing import shown_sides
 from studio_core.kernels.tonemap import prepare
 from studio_core.parallel import Workers
 from studio_core.scene.diff import Aspect
-from studio_core.scene.nodes import Scene
+from studio_core.scene.nodes import Light, Scene
 from studio_core.session import View
 from studio_core.shading.artifacts import (
     Hits,
@@ -146,14 +147,20 @@ class Compositor:
         faces = self._faces(surfaces, view, table.maps)
         tables = self._tables(scene, radiance, table, view, job)
         relief = self._embosser(scene, radiance, table, job)
-        out = self._pixels(parts[0], behind[0], faces, tables, relief, job)
+
+        def added(hits: Hits) -> F32:
+            return self._added(scene, radiance, hits, table, job)
+
+        out = self._pixels(parts[0], behind[0], faces, tables, added, relief, job)
         for part, beyond in zip(parts[1:], behind[1:], strict=True):
             finer = tables._replace(pixel_angle=_pixel_angle(part.layers[0].hits.view))
-            out[part.pixels] = self._pixels(part, beyond, faces, finer, relief, job)
+            out[part.pixels] = self._pixels(part, beyond, faces, finer, added, relief, job)
         linear = out.reshape(view.height, view.width, 3)
         corners = self._corners(lambda: visible_vertices(surfaces, hits), hits, mesh)
-        maps = (table.maps, backdrop, *((None, None) if relief is None else (relief.bend, table.reliefs)))
-        colours = VertexColours(tables.record, tables.sums, corners, *maps)
+        colours = None  # what pixels have of their own nobody else can interpolate
+        if radiance.pixel is None:
+            maps = (table.maps, backdrop, *((None, None) if relief is None else (relief.bend, table.reliefs)))
+            colours = VertexColours(tables.record, tables.sums, corners, *maps)
         return Picture(radiance, linear, outline.coverage, outline.node, outline.distance, colours)
 
     def radiance(
@@ -171,7 +178,8 @@ class Compositor:
         """
         faces = self._faces(radiance.surfaces, hits.view, table.maps)
         tables = self._tables(scene, radiance, table, hits.view, job)
-        out = self._hits(hits, faces, tables, self._embosser(scene, radiance, table, job), job)
+        added = self._added(scene, radiance, hits, table, job)
+        out = self._hits(hits, faces, tables, added, self._embosser(scene, radiance, table, job), job)
         rows, photograph = self.photograph(scene, radiance.surfaces, hits, samples)
         given = (rows, rows, 1, np.ones(len(rows), np.float32), hits.face, hits.u, hits.v, faces.shown)
         add_caught(0, len(rows), *given, tables.record, photograph, out)
@@ -201,27 +209,46 @@ class Compositor:
         hit_coefficients(*given, out)
         return out.reshape(-1, table.width, 3)
 
+    def _added(
+        self, scene: Scene, radiance: Radiance, hits: Hits, table: Coefficients, job: Job | None
+    ) -> F32:
+        """(N, 3) light of single hits that is summed there, with gains; empty where there is none."""
+        own, out = radiance.pixel, NO_COLOUR
+
+        def looks(some: Hits) -> F32:
+            return self.coefficients(radiance.surfaces, some, table)
+
+        for node in radiance.layers if own is not None else ():
+            light = scene.nodes.get(node)
+            if own is None or node not in own.nodes or not isinstance(light, Light) or not scene.shown(node):
+                continue
+            lit = own.colours(node, hits, looks, table, job) * np.asarray(light.gain(), np.float32)
+            out = out + lit if len(out) else lit
+        return out
+
     def _pixels(
         self,
         part: Part,
         behind: Behind,
         faces: _Faces,
         tables: _Tables,
+        added: Callable[[Hits], F32],
         relief: Relief | None,
         job: Job | None,
     ) -> F32:
         """(P, 3) the pixels of a part before what is behind them."""
         layers, hits, background = part.layers, part.layers[0].hits, behind.pixels
+        own = added(hits)
         given = (hits.face, hits.u, hits.v, hits.distance, *faces, *tables)
         alone = hits.samples == 1 and not hits.behind  # then the background fills what is not hit
 
         def look(start: int, stop: int, values: F32) -> None:
-            shade_hits(start, stop, *given, background if alone else NO_COLOUR, values)
+            shade_hits(start, stop, *given, background if alone else NO_COLOUR, own, values)
 
         seen = embossed(look, relief, _embossing(hits, faces, tables))
         out = averaged(layers[0], seen, NO_COLOUR if alone else background, self._workers, job)
         for layer in layers[1:]:
-            values = self._hits(layer.hits, faces, tables, relief, job)
+            values = self._hits(layer.hits, faces, tables, added(layer.hits), relief, job)
             add_samples(layer.samples, hits.samples**2, layer.weight, values, out)
         for layer, photograph in zip(layers, behind.caught, strict=False):
             if len(layer.caught):
@@ -242,14 +269,20 @@ class Compositor:
         self._workers.run(len(rows), PIXELS, catch, job)
 
     def _hits(
-        self, hits: Hits, faces: _Faces, tables: _Tables, relief: Relief | None, job: Job | None
+        self,
+        hits: Hits,
+        faces: _Faces,
+        tables: _Tables,
+        added: F32,
+        relief: Relief | None,
+        job: Job | None,
     ) -> F32:
         out = np.empty((len(hits.face), 3), np.float32)
 
         given = (hits.face, hits.u, hits.v, hits.distance, *faces, *tables)
 
         def shade(start: int, stop: int, values: F32) -> None:
-            shade_hits(start, stop, *given, NO_COLOUR, values)
+            shade_hits(start, stop, *given, NO_COLOUR, added, values)
 
         seen = embossed(shade, relief, _embossing(hits, faces, tables))
         self._workers.run(len(out), PIXELS, lambda start, stop: seen(start, stop, out[start:stop]), job)

@@ -26,6 +26,7 @@ class Bound:
         own = getattr(inner, "terms_of", None)
         self.terms: int = inner.terms if own is None else own(self.tables)
         self.textures = inner.textures
+        self.turning = str(getattr(inner, "turning", ""))
         self.shape_textures: tuple[str, ...] = tuple(getattr(inner, "shape_textures", ()))
 
     def __eq__(self, other: object) -> bool:

@@ -184,11 +184,13 @@ def shade_hits(
     uv_map: F32,
     pixel_angle: float,
     beside: F32,
+    added: F32,
     out: F32,
 ) -> None:
     """Radiance out (stop − start, 3) of hits start … stop−1.
 
     face (N,), u, v, distance are hits, −1 nothing: this gets beside[n] (N, 3), or 0 where that is empty.
+    added (N, 3) is light that vertices do not have, or empty.
     shown (F, 3) and height (F,) come from `facing.shown_sides`, density (F,) from `face_texels`, record
     (V, RECORD) and sums (V, T·3) from `add_light`. Material m is of kind[m]; level l < levels[m] of its map
     starts at row first[m, l] of `texels` (R, 3) or `tables` (R, T·3) and has size[m, l] = (height, width);
@@ -236,7 +238,10 @@ def shade_hits(
                     found[t] *= mix(sums[i, t], sums[j, t], sums[k, t], w1, w2)
                 for t in range(0, len(found), 3):
                     red, green, blue = red + found[t], green + found[t + 1], blue + found[t + 2]
-                red, green, blue = max(red, zero), max(green, zero), max(blue, zero)
+        if len(added):
+            red, green, blue = red + added[n, 0], green + added[n, 1], blue + added[n, 2]
+        if kind[m] == GENERAL:
+            red, green, blue = max(red, zero), max(green, zero), max(blue, zero)
         out[n - start, 0], out[n - start, 1], out[n - start, 2] = red, green, blue
 
 

@@ -6,9 +6,9 @@ V shading vertices, F faces, M materials, S directions, N picture samples.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, TypeAlias, Union
+from typing import TYPE_CHECKING, Protocol, TypeAlias, Union
 
 import numpy as np
 import numpy.typing as npt
@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from studio_core.scene.face_tree import FaceTree
     from studio_core.scene.world_mesh import WorldMesh
     from studio_core.shading.coefficients import Maps
+    from studio_core.shading.job import Job
     from studio_core.shading.reliefs import Reliefs
 
 Source: TypeAlias = tuple[NodeId, Geometry, tuple[MaterialId, ...]]
@@ -241,12 +242,31 @@ class LayerRadiance:
         return LayerRadiance(terms, self.irradiance, tilts)
 
 
+class PixelLight(Protocol):
+    """Light that is summed at every hit of the picture instead of between vertices."""
+
+    @property
+    def nodes(self) -> frozenset[NodeId]:
+        """Whose."""
+        ...
+
+    def colours(
+        self, node: NodeId, hits: Hits, looks: Callable[[Hits], F32], key: object, job: Job | None = None
+    ) -> F32:
+        """(N, 3) of one of the lights at unit gain, Σ_k c_k b_k L V cosθ, of any sign; 0 without a hit.
+
+        `looks` gives the coefficients (M, T, 3) of some of the hits; where `key` is the same, so are they.
+        """
+        ...
+
+
 @dataclass(frozen=True)
 class Radiance:
     """Radiance per shading vertex, by light layer and BRDF term, towards `view`.
 
     B(x, ω_o) = Σ_layers gain · Σ_k c_k · terms[k]. `valid` marks the vertices that were computed.
-    `directions` says how finely, `final` whether it is as fine as asked for.
+    `directions` says how finely, `final` whether it is as fine as asked for. In a picture `pixel` stands in
+    the place of its own lights' layers.
     """
 
     surfaces: Surfaces
@@ -256,6 +276,7 @@ class Radiance:
     directions: int
     final: bool
     counts: Mapping[str, int] = field(default_factory=dict)
+    pixel: PixelLight | None = None
 
     @property
     def width(self) -> int:
@@ -388,6 +409,7 @@ __all__ = [
     "Lighting",
     "MeasuredError",
     "Picture",
+    "PixelLight",
     "Radiance",
     "ShadingPoints",
     "Shapes",

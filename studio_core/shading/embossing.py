@@ -71,11 +71,11 @@ class Embosser:
 
 
 def lit(scene: Scene, radiance: Radiance) -> list[tuple[F32, LayerRadiance]]:
-    """The layers of lights that are on, each with its gain (3,)."""
-    made = []
+    """The layers of lights that are on and not summed in every pixel, each with its gain (3,)."""
+    made, apart = [], radiance.pixel.nodes if radiance.pixel is not None else frozenset()
     for node, layer in radiance.layers.items():
         light = scene.nodes.get(node)
-        if isinstance(light, Light) and scene.shown(node):
+        if isinstance(light, Light) and scene.shown(node) and node not in apart:
             made.append((np.asarray(light.gain(), np.float32), layer))
     return made
 

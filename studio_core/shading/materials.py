@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, cast
@@ -83,6 +84,9 @@ def resolve(material: Material, registry: Registry) -> Resolved:
             mean = linear_rgb(texture.image).mean(axis=(0, 1), dtype=np.float64)
             values[name] = _times(values[name], mean)
             problem = f"{material.name}: the textures of one material lie alike; {name} is shown as its mean"
+    turning = getattr(brdf, "turning", "")
+    for texture in (*textures.values(),)[:1] if turning else ():
+        values[turning] = math.remainder(_number(values[turning]) + texture.rotation, 360.0)
     if not getattr(brdf, "tables", ()):
         return Resolved(brdf, values, textures, problem, (), shaping)
     try:

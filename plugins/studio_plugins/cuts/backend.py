@@ -59,6 +59,12 @@ class Params(SurfaceParams):
     lamp_samples: int = param(
         64, "Lamp samples", "Shadow rays to an area lamp", low=1, high=256, advanced=True
     )
+    pixel_lamps: bool = param(
+        False,
+        "Lamps in every pixel",
+        "Point, spot and directional lamps light every pixel by itself: slower, with true highlights",
+        advanced=True,
+    )
     everywhere: bool = param(
         False, "Hidden places too", "Also light what the camera does not see", advanced=True
     )

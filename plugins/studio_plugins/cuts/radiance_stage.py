@@ -16,6 +16,7 @@ from studio_core.shading.artifacts import Hits, LayerRadiance, Radiance, Shading
 from studio_core.shading.frame import Frame
 from studio_core.shading.job import Job
 from studio_core.shading.pipeline import Inputs
+from studio_core.shading.pixel_lamps import NEEDS, PixelLampsMaker
 from studio_plugins.cuts.fill import fill, lift
 from studio_plugins.cuts.focus_stage import Focused
 from studio_plugins.cuts.light_stage import Arriving
@@ -38,12 +39,13 @@ class _Layer:
 class RadianceStage:
     """Sums BRDFs over nodes, for the vertices where nodes, material or eye are others than before."""
 
-    needs: tuple[type, ...] = (Surfaces, Shapes, Hits, Seen, Arriving, Focused)
+    needs: tuple[type, ...] = (*NEEDS, Seen, Arriving, Focused)
     gives = Radiance
     dirtied_by = Aspect.VIEW | Aspect.QUALITY
 
     def __init__(self, services: Services) -> None:
         self._workers = services.workers
+        self._lamps = PixelLampsMaker(services)
         self._layers: dict[NodeId, _Layer] = {}
         self._eye: tuple[float, ...] = ()
         self._kernels: dict[tuple[int, bytes, float], int] = {}
@@ -137,7 +139,8 @@ class RadianceStage:
             "vertices_traced_to_lamps": arriving.lamp_points if Arriving in inputs.rebuilt else 0,
             "nodes": looked,
         }
-        return Radiance(surfaces, inputs[Hits], layers, seen.mask, 1 << seen.level, seen.exact, counts)
+        made = Radiance(surfaces, inputs[Hits], layers, seen.mask, 1 << seen.level, seen.exact, counts)
+        return self._lamps(frame, inputs, made) if frame.params.pixel_lamps else made
 
     def _kernel_of(self, shapes: Shapes, mesh: ShadingPoints) -> I64:
         """(V,) a number for each vertex' kernel and shape: the same while they are; 0 without a material."""

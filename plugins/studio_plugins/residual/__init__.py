@@ -13,7 +13,7 @@ window.
 - the fit: `parametric` (f_r), `bases` (δ*), `tables` (what all texels share), `masks`, `solve` (rank-aware,
   robust), `refine` (light directions and strengths), `fit` puts them in order and chooses
 - what came of it: `result`, `errors`, `splits`, `frames` (tangent space)
-- in a scene: `model` (the reflectance model `captured`), `material` (a fit as a material)
+- in a scene: `model` (the reflectance model `captured`), `material` (a fit as a material), `backend`
 
 Values are radiance under a light of strength 1, by which a white matte surface that faces it has the value 1
 (irradiance π). The camera looks along −z: x to the right, y up, z towards the camera.
@@ -25,5 +25,8 @@ plugin = Plugin(
     id="residual",
     label="Residual materials: cloth and stone from photographs",
     api=API,
-    provides={"brdf": {"captured": "studio_plugins.residual.model:MODEL"}},
+    provides={
+        "brdf": {"captured": "studio_plugins.residual.model:MODEL"},
+        "backend": {"residual": "studio_plugins.residual.backend:BACKEND"},
+    },
 )

@@ -26,7 +26,7 @@ parameter    range     unit   meaning
 albedo       0…1       –      colour of the matte part, times its map; linear Rec.709
 shine        0…1       –      colour of the highlight, times its map
 character    0…2       –      how much is shown of what a spot has of its own: 1 as photographed
-direction    −180…180  °      the pattern's horizontal, from the texture coordinates' u
+direction    −180…180  °      of bumps and weave within the pictures: 0 as photographed
 ===========  ========  =====  ==================================================================
 
 What was fitted lies in the material's table `capture` (`Capture`), the maps are its textures: `albedo`,
@@ -151,7 +151,7 @@ class Params:
         low=0.0, high=2.0,
     )  # fmt: skip
     direction: float = param(
-        0.0, "Pattern direction", "Of the pattern's horizontal, from the surface's own", unit="°",
+        0.0, "Light turned", "How light on bumps is turned against the pictures; 0 as photographed", unit="°",
         low=-180.0, high=180.0,
     )  # fmt: skip
 
@@ -319,6 +319,7 @@ class Captured:
     terms = 2
     textures: tuple[str, ...] = ("albedo", "shine", *RESIDUAL)
     tables: tuple[str, ...] = (SLOT,)
+    turning = "direction"
 
     def __init__(self) -> None:
         self._plain = Capture(2).table("matte")

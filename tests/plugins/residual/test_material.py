@@ -13,6 +13,7 @@ from studio_core.brdfs.albedo import albedo_table
 from studio_core.brdfs.bound import bound
 from studio_core.errors import InputError
 from studio_core.params import defaults
+from studio_core.shading.materials import resolve
 from studio_plugins.residual.bases import BASES
 from studio_plugins.residual.frames import tangent_frames
 from studio_plugins.residual.material import SHOWN, scene_material
@@ -115,3 +116,13 @@ def test_a_flat_sample_stays_as_it_is() -> None:
         np.testing.assert_array_equal(
             made.material.textures[axis].image.pixels, fit.coefficients[:, :, 1 + k]
         )
+
+
+def test_turning_the_pictures_turns_the_light_on_bumps(host: Any) -> None:
+    material = scene_material(made_up("lambert", "half")).material
+    turned = {name: replace(texture, rotation=200.0) for name, texture in material.textures.items()}
+    found = resolve(replace(material, textures=turned), host)
+    assert not found.problem
+    assert found.values["direction"] == pytest.approx(-160)
+    straight = resolve(material, host)
+    assert straight.values["direction"] == 0

@@ -121,7 +121,7 @@ def _one_triangle(kind):
     return looks, np.array([[1, 0, 0, 0, 1, 0]], np.float32)
 
 
-def _shade(kind, face=0, corners=(0, 1, 2), distance=1.0, beside=NO_COLOUR):
+def _shade(kind, face=0, corners=(0, 1, 2), distance=1.0, beside=NO_COLOUR, added=NO_COLOUR):
     looks, uv_map = _one_triangle(kind)
     out = np.full((1, 3), -1, np.float32)
     shade_hits(
@@ -139,6 +139,7 @@ def _shade(kind, face=0, corners=(0, 1, 2), distance=1.0, beside=NO_COLOUR):
         uv_map,
         0.01,
         beside,
+        added,
         out,
     )
     return out[0]
@@ -169,6 +170,15 @@ def test_sums_below_nothing_are_cut_off(monkeypatch):
     monkeypatch.setitem(globals(), "_one_triangle", lambda _: (darker, uv_map))
     looks[1][:, :3] = 0
     assert (_shade(GENERAL) == 0).all()
+
+
+@pytest.mark.parametrize("kind", [CONSTANT, AFFINE, GENERAL])
+def test_light_that_vertices_do_not_have_is_added_before_sums_are_cut_off(kind):
+    own = np.array([[0.5, 0.0, -100.0]], np.float32)
+    made, alone = _shade(kind, added=own), _shade(kind)
+    least = 0.0 if kind == GENERAL else -np.inf
+    np.testing.assert_allclose(made, np.maximum(alone + own[0], least), rtol=1e-6)
+    assert not _shade(kind, face=-1, added=own).any()
 
 
 def test_what_is_not_hit_shows_what_lies_beside():

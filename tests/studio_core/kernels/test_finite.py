@@ -139,7 +139,7 @@ def test_samples_of_any_triangle(corners, uvs, level, distance, density, kind):
     for met in (texels, np.array([density], np.float32)):
         given_faces = (shown, height, met, material)
         maps = (kinds, record, sums, PIXELS[:5, :3].copy(), PIXELS[:5], first, size, np.array([2]), scale)
-        shade_hits(0, 1, *hit, *given_faces, *maps, 0.01, PIXELS[:0, :3], out)
+        shade_hits(0, 1, *hit, *given_faces, *maps, 0.01, PIXELS[:0, :3], PIXELS[:0, :3], out)
         assert np.isfinite(out).all()
         assert (out >= 0).all()
         assert (out <= 4.001 * level).all()  # a plain part and three textured ones

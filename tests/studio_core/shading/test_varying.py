@@ -18,12 +18,13 @@ from studio_core.scene.shading_mesh import shade_mesh
 from studio_core.scene.transform import Transform
 from studio_core.scene.world_mesh import Placed, assemble
 from studio_core.shading.artifacts import Hits, Radiance, Shapes, Surfaces
-from studio_core.shading.error_meter import ErrorMeter, surface_uvs
+from studio_core.shading.error_meter import ErrorMeter
 from studio_core.shading.frame import Frame
 from studio_core.shading.job import Job
 from studio_core.shading.materials import finite_shape, resolve, same_shapes, shapes
 from studio_core.shading.offline import backend_params, scene_view
 from studio_core.shading.pipeline import Pipeline
+from studio_core.shading.surface_points import surface_uvs
 from studio_core.shading.varying import MOST, Grey, ShapeTable, picture_areas, step_of, stepped
 
 seeds = st.integers(0, 2**32 - 1)
@@ -255,7 +256,7 @@ def test_points_between_vertices_have_the_texel_itself(host, workers):
     surfaces, hits = pipeline.artifact(Surfaces), pipeline.artifact(Hits)
     known = np.flatnonzero(hits.face >= 0)
     some = Hits(hits.view, 1, hits.face[known], hits.u[known], hits.v[known], hits.distance[known])
-    uvs = surface_uvs(surfaces, some, frame)
+    uvs = surface_uvs(surfaces, some, np.asarray(frame.view.transform.translation))
     made = ShapeTable(host).at(scene, surfaces.materials, np.zeros(len(uvs), np.int32), uvs)
     wanted = Grey.of(texture.image).at(uvs, np.zeros(len(uvs), np.float32))
     assert isinstance(made, Shapes)
