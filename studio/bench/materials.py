@@ -16,6 +16,7 @@ PARTS = (
     "studio.bench.materials_energy",
     "studio.bench.materials_exchange",
     "studio.bench.materials_normals",
+    "studio.bench.materials_scene",
     "studio.bench.materials_captured",
     "studio.bench.materials_btf",
 )

@@ -146,7 +146,8 @@ def run(report: Report, program: Headless) -> None:
             report.add(case, "normal_error", mapped.relative_rmse, "ratio", mapped.uncertainty)
     case = "normals/cost"
     if report.wants(case):
-        for metric, (value, spread) in costs(program.services, 1 if report.quick else 9).items():
+        pair = floor_scene("plastic-0.4", None), floor_scene("plastic-0.4", pictures()["bricks"])
+        for metric, (value, spread) in costs(program.services, pair, 1 if report.quick else 9).items():
             report.add(case, metric, value, "ratio", spread)
 
 
@@ -174,13 +175,12 @@ def shaded(services: Services, scene: Scene, name: str = "cuts") -> tuple[Pipeli
     return pipeline, frame
 
 
-def costs(services: Services, repeats: int) -> dict[str, tuple[float, float]]:
-    """What light sums and pixels cost with a map over what they cost without, and how sure that is.
+def costs(services: Services, scenes: tuple[Scene, Scene], repeats: int) -> dict[str, tuple[float, float]]:
+    """What light sums and pixels of the second scene cost over those of the first, and how sure that is.
 
     The eye moves a little, in turn in front of both, so that what slows the machine slows both.
     """
-    image = pictures()["bricks"]
-    both = [shaded(services, floor_scene("plastic-0.4", shown)) for shown in (None, image)]
+    both = [shaded(services, scene) for scene in scenes]
     taken: dict[str, list[float]] = {"sum_cost_ratio": [], "pixel_cost_ratio": []}
     for step in range(1, repeats + 1):
         seconds = []
