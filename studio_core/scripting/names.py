@@ -51,6 +51,7 @@ GROUPS: dict[str, tuple[str, ...]] = {
             "replace_material",
             "lay_pattern",
             "grow_pattern",
+            "unwrap",
             "remove",
         ),
         *("add_model", "add_material", "keep_material", "light_from", "apply", "undo", "redo"),

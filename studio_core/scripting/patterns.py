@@ -1,4 +1,4 @@
-"""What scripts do to patterns: lay the pictures of a material by size, turn them, make larger ones."""
+"""What scripts do to patterns: lay pictures by size, turn them, grow them; coordinates to lay them on."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from studio_core.scene.nodes import Material, Scene
 from studio_core.scene.pattern import PLAIN, PatternRuler, pattern_size, with_rotation, with_size
 from studio_core.shading.grown_textures import grown, lying_alike
 from studio_core.shading.job import Job
+from studio_core.texture_coordinates import Coordinates, bare_objects, coordinates_for
 
 
 class Patterns(ABC):
@@ -26,6 +27,10 @@ class Patterns(ABC):
     @abstractmethod
     def scene(self) -> Scene:
         """The scene as it is now."""
+
+    @abstractmethod
+    def find(self, name: Any) -> Any:
+        """A node as it is now."""
 
     @abstractmethod
     def material(self, name: Any) -> Material:
@@ -57,6 +62,17 @@ class Patterns(ABC):
             laid = (made.scale, made.offset, made.rotation, made.aspect)
             edits.append(LayTextures(found.id, *laid, (name,)))
         self._document.apply(Compound(f"Pattern of {found.name}", tuple(edits)))
+
+    def unwrap(self, *things: Any) -> int:
+        """Texture coordinates in metres for what has none at and under some things; how many objects."""
+        bare = bare_objects(self.scene, [self.find(thing).id for thing in things])
+
+        def work(job: Job) -> Coordinates:
+            return coordinates_for(self.scene, bare, job)
+
+        if bare:
+            self._document.apply(self._run("Making texture coordinates", work).edit)
+        return len(bare)
 
     def grow_pattern(self, material: Any, times: float = 4.0, seed: int = 0) -> None:
         """Make the pictures of a material `times` as wide and high without a seam and without repetition.

@@ -386,3 +386,32 @@ def test_a_pattern_is_grown_for_large_surfaces(driver: Driver) -> None:
     driver.until(lambda: row.text.text() == "8 × 1024")
     assert row.grow.larger[4].isEnabled()
     assert not row.grow.larger[8].isEnabled()
+
+
+def test_pictures_ask_for_coordinates_where_there_are_none(driver: Driver) -> None:
+    flat = Geometry(
+        np.array([[0, 0, 0], [2, 0, 0], [2, 0, -4], [0, 0, -4]], np.float32),
+        np.array([[0, 1, 2], [0, 2, 3]], np.uint32),
+    )
+    board = Material(id="board", name="Board")
+    sheets = [MeshObject(id=i, name=i.title(), geometry=flat, materials=("board",)) for i in ("one", "two")]
+    driver.document.apply(Add(tuple(sheets), (board,)))
+    panel = choose(driver, "board")
+    bare = panel.editor.bare
+    assert bare is not None
+    assert bare.isHidden()
+    picture = Texture(Image(np.ones((4, 8, 3), np.float32)))
+    driver.document.apply(SetTexture("board", "base_color", picture))
+    driver.until(lambda: not bare.isHidden())
+    assert "One, Two" in bare.told.text()
+    bare.button.click()
+    driver.until(lambda: bare.isHidden())
+    assert driver.labels()[-1] == "Texture coordinates of 2 objects"
+    row = panel.editor.textures["base_color"].pattern
+    driver.until(lambda: row.width_field.isEnabled())
+    assert (row.width_field.value(), row.height_field.value()) == pytest.approx((1, 1), rel=1e-3)
+    driver.document.undo()
+    driver.session.select(["two"])
+    driver.do("object.coordinates")
+    driver.until(lambda: driver.labels()[-1] == "Texture coordinates of Two")
+    assert "One lacks" in bare.told.text()

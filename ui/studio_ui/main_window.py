@@ -45,6 +45,7 @@ from studio_ui.menus import Menus
 from studio_ui.objects.arranging import Arranging
 from studio_ui.objects.choosing import Choosing
 from studio_ui.objects.commands import Commands
+from studio_ui.objects.coordinates import TextureCoordinates
 from studio_ui.objects.magnet import Magnet
 from studio_ui.objects.rooms import Rooms
 from studio_ui.palette.palette import Palette, menu_entries
@@ -203,6 +204,7 @@ class MainWindow(QMainWindow):
             self.commands,
             self.viewing,
             self.arranging,
+            TextureCoordinates(context),
             self.magnet,
             self.cameras,
             self.aids,

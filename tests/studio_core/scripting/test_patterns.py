@@ -72,3 +72,13 @@ def test_a_pattern_is_grown(names):
     assert len(names._document.history) == 4
     with pytest.raises(EditError, match="no pictures"):
         names.grow_pattern("Plain")
+
+
+def test_what_has_no_coordinates_gets_some(names):
+    mesh = names.find("Floor").geometry
+    bare = Geometry(mesh.positions, mesh.faces)
+    names.apply(names.namespace["SetGeometry"]("floor", bare))
+    assert names.unwrap("Floor") == 1
+    assert size_of(names) == pytest.approx((1, 1), rel=1e-3)
+    assert names.unwrap("Floor") == 0
+    assert len(names._document.history) == 3

@@ -22,12 +22,15 @@ from studio_core.shading.grown_textures import grown, lying_alike
 from studio_core.shading.job import Job
 from studio_core.shading.materials import shape_textures
 from studio_core.shading.normal_maps import NORMAL
+from studio_core.texture_coordinates import bare_objects
 from studio_ui.context import Context
 from studio_ui.forms.fields import ColourField, Combo
 from studio_ui.forms.param_form import ParamForm, form_label, form_layout
 from studio_ui.forms.sinks import EditSink
 from studio_ui.forms.spin import MIXED
 from studio_ui.look.theme import GAP
+from studio_ui.objects.coordinates import TextureCoordinates
+from studio_ui.panels.bare_row import BareRow
 from studio_ui.panels.maps_row import MapsRow
 from studio_ui.panels.measurement_row import MeasurementRow, measurement_of
 from studio_ui.panels.panel import clear, note
@@ -65,6 +68,7 @@ class MaterialForm(QWidget):
         self._sink = EditSink(context.editing, self._make, self._label)
         self._built: object = self
         self._ruler = PatternRuler()
+        self.bare: BareRow | None = None
         self._column = QVBoxLayout(self)
         self._column.setContentsMargins(0, 0, 0, 0)
         self._column.setSpacing(GAP)
@@ -103,6 +107,9 @@ class MaterialForm(QWidget):
             self.maps.show_maps(last.textures, lengths)
         for name, shown in self.textures.items():
             shown.show_texture(last.textures.get(name), lengths)
+        if self.bare is not None:
+            lacking = bare_objects(scene, material=last.id) if last.textures else ()
+            self.bare.show_bare([node.name for node in lacking])
         if self.measurement is not None and last.values != self._fitted:
             self.measurement.tell("")  # it was of other values
 
@@ -142,7 +149,7 @@ class MaterialForm(QWidget):
         clear(self._column)
         self.form = self.common = self.bumps = None
         self.textures = {}
-        self.maps = self.measurement = None
+        self.maps = self.measurement = self.bare = None
         if not materials:
             self._column.addWidget(note("The scene has no materials yet."))
             return
@@ -164,6 +171,7 @@ class MaterialForm(QWidget):
                 if isinstance(field, ColourField) and field.menu is not None:
                     field.menu.metal = partial(self._put_metal, name)
             names = (*model.textures, *shape_textures(model)) if len(materials) == 1 else ()
+            bare = self.bare = BareRow(self._make_coordinates) if names else None
             if any(name not in infos for name in names):  # made together, of no number that can be typed
                 self._column.addWidget(self._pattern(materials[0].id, names, model.label))
                 names = ()
@@ -174,6 +182,8 @@ class MaterialForm(QWidget):
                 self._column.addWidget(self._texture(materials[0].id, NORMAL, "Normal", told))
                 self.bumps = ParamForm(_BUMPS, self._sink, defaults={NORMAL: 1.0})
                 self._column.addWidget(self.bumps)
+            if bare is not None:
+                self._column.addWidget(bare)
         elif not self._context.warm:
             self._column.addWidget(note("Loading…"))
         elif len({material.model for material in materials}) == 1:
@@ -353,3 +363,9 @@ class MaterialForm(QWidget):
             self._context.editing.apply(Compound(f"Larger pattern of {there.name}", edits))
 
         self._context.tasks.run(f"Growing the pattern of {before.name}", work, done)
+
+    def _make_coordinates(self) -> None:
+        """For all objects with this material that have none."""
+        if len(self.materials) == 1:
+            scene = self._context.document.scene
+            TextureCoordinates(self._context).make(bare_objects(scene, material=self.materials[0]))

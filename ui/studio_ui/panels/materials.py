@@ -30,6 +30,7 @@ from studio_ui.panels.panel import Panel, row
 from studio_ui.panels.swatch import SIZE
 
 _WHAT_CHANGES_USERS = Aspect.STRUCTURE | Aspect.MATERIAL
+_WHAT_CHANGES_SIZES = Aspect.GEOMETRY | Aspect.TRANSFORM  # of patterns; once a gesture ends
 _WHAT_LIGHTS = Aspect.STRUCTURE | Aspect.LIGHT | Aspect.GAIN
 
 
@@ -190,7 +191,11 @@ class MaterialsPanel(Panel):
             self._offer_slots()
 
     def _edited(self, before: Scene, after: Scene, changes: Changes) -> None:
-        if changes.materials or changes.aspects & _WHAT_CHANGES_USERS:
+        if (
+            changes.materials
+            or changes.aspects & _WHAT_CHANGES_USERS
+            or (changes.aspects & _WHAT_CHANGES_SIZES and not self.context.editing.busy)
+        ):
             self._soon.start(0)
         if changes.aspects & _WHAT_LIGHTS and not self.context.editing.busy:
             self._pictures()
