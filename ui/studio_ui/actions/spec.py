@@ -45,6 +45,7 @@ REASONS = {
     "two": "Choose two things or more",
     "three": "Choose three things or more",
     "mesh": "Nothing is chosen that has a material",
+    "bare": "Nothing is chosen that has no texture coordinates",
     "aimable": "No camera is chosen",
     "through": "No camera is looked through",
     **{f"camera_{n}": "There are fewer cameras" for n in range(1, 10)},
