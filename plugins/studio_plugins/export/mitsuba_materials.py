@@ -192,10 +192,11 @@ def nearest(material: Material, resolved: Resolved, registry: Registry) -> Mater
             red, green, blue = (float(c) for c in np.clip(mean_albedo(resolved.brdf, resolved.values), 0, 1))
             values["base_color"] = (red, green, blue)
         return replace(material, model="lambert", values=values, textures=textures)
-    wide, narrow = found.alphas
-    strength = found.f0 * found.specular * max(found.specular_color)
+    mean = found.mean()
+    wide, narrow = mean.alphas
+    strength = mean.f0 * mean.specular * max(mean.specular_color)
     values |= {
-        "metallic": found.metallic,
+        "metallic": mean.metallic,
         "roughness": float((wide * narrow) ** 0.25),
         "specular": min(strength / 0.08, 1.0),
     }
