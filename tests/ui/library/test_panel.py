@@ -317,6 +317,45 @@ def test_opening_a_material_keeps_it_once_and_shows_it(
     assert driver.labels() == ["Open"], "the project that is open stays"
 
 
+def test_files_are_dropped_on_the_library(driver: Driver, panel: LibraryPanel, tmp_path: Path) -> None:
+    for name in ("Velvet", "Loden"):
+        write(tmp_path / f"{name}.lucmat", Kept(Material(id="x", name=name, model="oren-nayar")))
+    picture = tmp_path / "room.exr"
+    picture.write_bytes(b"")
+    _drop(panel.view, files(tmp_path / "Velvet.lucmat", picture))
+    driver.until(
+        lambda: driver.problems() == ["Materials and pictures of light are dropped one after the other."]
+    )
+    assert "Velvet" not in listed(panel)
+    assert _drop(panel.view, files(tmp_path / "Velvet.lucmat", tmp_path / "Loden.lucmat"))
+    driver.until(lambda: listed(panel)[:3] == ["My materials", "Loden", "Velvet"])
+    assert driver.labels() == ["Open"]
+
+
+def test_several_are_tagged_exported_and_added_together(
+    driver: Driver, panel: LibraryPanel, tmp_path: Path
+) -> None:
+    panel.keep(("red", "blue"))
+    driver.until(lambda: listed(panel)[:3] == ["My materials", "Blue", "Red"])
+    choose(panel, "Blue", "Red")
+    driver.answers.text_ = "loft"
+    actions(panel)["Add tags…"].trigger()
+    driver.until(lambda: [entry.tags for entry in panel.view.entries] == [("loft",)] * 2)
+    panel.tags.choose("loft")
+    assert listed(panel) == ["My materials", "Blue", "Red"]
+    driver.answers.target = tmp_path / "out"
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "Red.lucmat").write_text("somebody's")
+    actions(panel)["Export…"].trigger()
+    driver.idle()
+    names = sorted(path.name for path in (tmp_path / "out").iterdir())
+    assert names == ["Blue.lucmat", "Red 2.lucmat", "Red.lucmat"]
+    assert (tmp_path / "out" / "Red.lucmat").read_text() == "somebody's"
+    actions(panel)["Add to scene"].trigger()
+    assert driver.labels()[1:] == ["Add 2 materials"]
+    assert [m.name for m in driver.document.scene.materials.values()] == ["Red", "Blue", "Blue 2", "Red 2"]
+
+
 def test_the_palette_finds_it(driver: Driver, panel: LibraryPanel) -> None:
     driver.session.select(["stool"])
     driver.do("help.palette")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 
 from PySide6.QtCore import QFile
@@ -22,7 +22,7 @@ FILES = Filter("Materials", (SUFFIX,))
 
 
 class MaterialLibrary:
-    """`changed()` when other entries are there; `came(path)` when a material was put on the shelf,
+    """`changed()` when other entries are there; `came(paths)` when materials were put on the shelf,
     `opened()` when the person wants to see it.
 
     Nothing is read before somebody asks. Files that other programs put there are seen at the next `read`.
@@ -35,7 +35,7 @@ class MaterialLibrary:
             shelf = Shelf(user_materials(), PRESETS)
         self.shelf = shelf
         self.changed: Signal[[]] = Signal()
-        self.came: Signal[[Path]] = Signal()
+        self.came: Signal[[tuple[Path, ...]]] = Signal()
         self.opened: Signal[[]] = Signal()
         self.trash: Callable[[Path], bool] = lambda path: bool(QFile.moveToTrash(str(path)))
         """Whether a file is in the trash now."""
@@ -118,12 +118,12 @@ class MaterialLibrary:
     def rename(self, entry: Entry, name: str) -> None:
         """Another name, for the material and its file."""
         if name and name != entry.name:
-            self._change(entry, lambda: self.shelf.change(entry, name=name))
+            self._change([entry], lambda entry: self.shelf.change(entry, name=name))
 
-    def tag(self, entry: Entry, tags: Sequence[str]) -> None:
-        """Other tags."""
-        if tuple(tags) != entry.tags:
-            self._change(entry, lambda: self.shelf.change(entry, tags=tags))
+    def tag(self, tags: Mapping[str, Sequence[str]]) -> None:
+        """Other tags for entries, by their keys."""
+        changed = [entry for entry in self._own if entry.tags != tuple(tags.get(entry.key, entry.tags))]
+        self._change(changed, lambda entry: self.shelf.change(entry, tags=tags[entry.key]))
 
     def ask_tags(self, entries: Sequence[Entry]) -> None:
         """Ask for the tags of one's own entry; for several, which ones to add."""
@@ -135,8 +135,8 @@ class MaterialLibrary:
         if text is None:
             return
         words = tuple(word.strip() for word in text.split(",") if word.strip())
-        for entry in own:
-            self.tag(entry, words if len(own) == 1 else tuple(dict.fromkeys((*entry.tags, *words))))
+        together = {entry.key: tuple(dict.fromkeys((*entry.tags, *words))) for entry in own}
+        self.tag({own[0].key: words} if len(own) == 1 else together)
 
     def remove(self, entries: Sequence[Entry]) -> None:
         """To the trash; where there is none they are deleted after asking."""
@@ -244,19 +244,16 @@ class MaterialLibrary:
 
         return [FILES, *(Filter(label, endings) for label, endings in kinds(self._context.host)[1:])]
 
-    def _change(self, entry: Entry, work: Callable[[], Path]) -> None:
-        def put(job: Job) -> Path:
-            return work()
+    def _change(self, entries: Sequence[Entry], work: Callable[[Entry], Path]) -> None:
+        def put(job: Job) -> list[Path]:
+            return [work(entry) for entry in entries]
 
-        def done(path: Path) -> None:
-            self._put([path])
-
-        self._context.tasks.run(f"Changing {entry.name}", put, done, lambda error: self.read())
+        if entries:
+            self._context.tasks.run(f"Changing {_names(entries)}", put, self._put, lambda error: self.read())
 
     def _put(self, paths: Sequence[Path]) -> None:
         self.read()
-        for path in paths:
-            self.came.emit(path)
+        self.came.emit(tuple(paths))
 
 
 def _names(entries: Sequence[Entry]) -> str:

@@ -170,8 +170,8 @@ class LibraryPanel(Panel):
         self.refresh()
         self._show_awaited()
 
-    def _came(self, path: Path) -> None:
-        self._awaited.add(path)
+    def _came(self, paths: tuple[Path, ...]) -> None:
+        self._awaited = set(paths)
         self._show_awaited()
 
     def _show_awaited(self) -> None:
