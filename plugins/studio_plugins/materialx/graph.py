@@ -162,6 +162,8 @@ class Graph:
         space = holder.getColorSpace() or node.getColorSpace() or holder.getActiveColorSpace()
         if kind == "UsdUVTexture":
             space = self._usd_space(node, space)
+        elif not node.isColorType():  # numbers have no colour space, whatever is around them
+            space = ""
         factor: tuple[float, ...] = (1.0,)
         told = get("factor" if kind == "gltf_image" else "color" if kind == "gltf_colorimage" else "scale")
         if told is not None and kind != "image" and kind != "tiledimage":

@@ -18,6 +18,7 @@ COAT_IOR = 1.5
 
 
 def _open_pbr(s: Slots) -> Surface:
+    """Before its version 1.0 the grain was given as in Standard Surface."""
     metallic = s.number("metallic", "base_metalness", 0.0)
     ior = s.plain("specular_ior", 1.5)
     weight = s.plain("specular_weight", 1.0)
@@ -31,21 +32,20 @@ def _open_pbr(s: Slots) -> Surface:
             s.move("specular_color", "edge_tint")
     roughness, strength = _widths(
         s.number("roughness", "specular_roughness", 0.3),
-        _open_pbr_widths(s.plain("specular_roughness_anisotropy", 0.0)),
+        _open_pbr_widths(s.plain("specular_roughness_anisotropy", s.plain("specular_anisotropy", 0.0))),
     )
     s.left_out("subsurface_weight", "light that goes below its surface")
     s.left_out("thin_film_weight", "its thin film")
     s.left_out("emission_luminance", "the light that it gives", "add a lamp for it")
-    coat, darker = s.number("clearcoat", "coat_weight", 0.0), s.plain_colour("coat_color", WHITE)
-    if coat > 0 and darker != WHITE:
-        s.say("the colour of its clear coat is left out")
+    coat = s.number("clearcoat", "coat_weight", 0.0)
+    base = s.product("base_color", "base_weight", "base_color", 1.0, (0.8,) * 3)
     return Surface(
-        base_color=s.product("base_color", "base_weight", "base_color", 1.0, (0.8,) * 3),
+        base_color=s.below("base_color", base, coat, "coat_color"),
         diffuse_roughness=s.plain("base_diffuse_roughness", 0.0),
         metallic=metallic,
         roughness=roughness,
         anisotropy=strength,
-        anisotropy_rotation=s.turned("geometry_tangent"),
+        anisotropy_rotation=s.turned("geometry_tangent") + 360 * s.plain("specular_rotation", 0.0),
         ior=ior_of(f0),
         specular=0.0 if weight <= 0 else strongest,
         specular_color=_over(tint, strongest),
@@ -68,15 +68,16 @@ def _standard(s: Slots) -> Surface:
     s.left_out("subsurface", "light that goes below its surface")
     s.left_out("thin_film_thickness", "its thin film")
     s.left_out("emission", "the light that it gives", "add a lamp for it")
-    coat, darker = s.number("clearcoat", "coat", 0.0), s.plain_colour("coat_color", WHITE)
-    if coat > 0 and darker != WHITE:
-        s.say("the colour of its clear coat is left out")
+    coat = s.number("clearcoat", "coat", 0.0)
+    if metallic > 0 and tint != WHITE:
+        s.say("the tint of its rim is left out")
     opacity = s.plain_colour("opacity", WHITE)
     strongest = max(tint)
     version = s.node.getVersionString()
-    base, grey = (0.8, 1.0) if version.startswith("1.0.0") else (1.0, 0.8)
+    weight_of, grey = (0.8, 1.0) if version.startswith("1.0.0") else (1.0, 0.8)
+    base = s.product("base_color", "base", "base_color", weight_of, (grey,) * 3)
     return Surface(
-        base_color=s.product("base_color", "base", "base_color", base, (grey,) * 3),
+        base_color=s.below("base_color", base, coat, "coat_color"),
         diffuse_roughness=s.plain("diffuse_roughness", 0.0),
         metallic=metallic,
         roughness=roughness,
@@ -85,7 +86,6 @@ def _standard(s: Slots) -> Surface:
         ior=max(s.plain("specular_IOR", 1.5), 1.0),
         specular=min(max(weight, 0.0), 1.0) * strongest,
         specular_color=_over(tint, strongest),
-        edge_tint=tint if metallic > 0 else WHITE,
         sheen_color=s.product("sheen_color", "sheen", "sheen_color", 0.0, WHITE),
         sheen_roughness=s.number("sheen_roughness", "sheen_roughness", 0.3),
         clearcoat=coat,

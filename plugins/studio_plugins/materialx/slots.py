@@ -85,6 +85,19 @@ class Slots:
             self.textures.pop(target, None)
         return (red, green, blue)
 
+    def below(self, target: str, value: Colour, weight: float, source: str) -> Colour:
+        """A colour below a coat that colours what comes through it; its picture where there is no other."""
+        if weight <= 0:
+            return value
+        own = self.textures.pop(target, None)
+        tint = self.colour(target, source, (1.0, 1.0, 1.0))
+        if own is not None:
+            if target in self.textures:
+                self.say("the picture of its clear coat's colour is left out")
+            self.textures[target] = own
+        red, green, blue = (v * (1 + weight * (t - 1)) for v, t in zip(value, tint, strict=True))
+        return (red, green, blue)
+
     def normal(self, source: str) -> float:
         """Lays a normal map; its strength."""
         found = self.graph.input(self.node, source)

@@ -150,6 +150,21 @@ def test_graphs_channels_and_interfaces_are_followed(tmp_path: Path) -> None:
     np.testing.assert_array_equal(made.textures["normal"].image.pixels, pixels)
 
 
+def test_channels_as_older_files_name_them(tmp_path: Path) -> None:
+    pixels = picture(tmp_path)
+    graph = (
+        '<nodegraph name="g"><image name="i" type="vector3">'
+        '<input name="file" type="filename" value="wood.png"/></image><output name="orm" type="vector3" nodename="i"/></nodegraph>'
+    )
+    reached = 'type="float" nodegraph="g" output="orm" channels="{}"'
+    used = shader("gltf_pbr", metallic=reached.format("z"), roughness=reached.format("y"))
+    path = tmp_path / "old.mtlx"
+    path.write_text(f"{HEAD}{graph}{used}</materialx>".replace("1.39", "1.38"))
+    (made,) = IMPORTER.load(path).materials
+    for name, channel in (("metallic", 2), ("roughness", 1)):
+        np.testing.assert_array_equal(made.textures[name].image.pixels[..., 0], pixels[..., channel])
+
+
 def test_placing_by_other_programs(tmp_path: Path) -> None:
     """glTF's pivot is the picture's upper left corner; place2d divides, and turns it counter-clockwise."""
     picture(tmp_path)
@@ -203,6 +218,34 @@ def test_what_is_sheared_or_computed_is_said(tmp_path: Path) -> None:
         shader("gltf_pbr", base_color='type="color3" nodename="i"') + noise.replace("noise3d", "image"),
     )
     assert model.materials[0].textures == {}
+
+
+def test_numbers_have_no_colour_space_and_a_coat_colours_what_is_below(tmp_path: Path) -> None:
+    pixels = picture(tmp_path)
+    graph = (
+        '<nodegraph name="g" colorspace="srgb_texture"><image name="c" type="color3">'
+        '<input name="file" type="filename" value="wood.png"/></image><image name="r" type="float">'
+        '<input name="file" type="filename" value="wood.png"/></image>'
+        '<output name="hue" type="color3" nodename="c"/>'
+        '<output name="dull" type="float" nodename="r"/></nodegraph>'
+    )
+    used = shader(
+        "standard_surface",
+        base="1",
+        metalness="1",
+        specular_roughness='type="float" nodegraph="g" output="dull"',
+        coat="1",
+        coat_color='type="color3" nodegraph="g" output="hue"',
+    )
+    (made,) = load(tmp_path, graph + used).materials
+    assert made.model == "ggx"
+    assert made.values["base_color"] == pytest.approx((0.8, 0.8, 0.8))
+    np.testing.assert_array_equal(made.textures["base_color"].image.pixels, pixels)
+    np.testing.assert_array_equal(made.textures["roughness"].image.pixels[..., 0], pixels[..., 0])
+    assert made.textures["roughness"].image.encoding == "data"
+    dull = shader("open_pbr_surface", coat_weight="0.5", coat_color="0.2, 0.6, 1")
+    (made,) = load(tmp_path, dull).materials
+    np.testing.assert_allclose(made.values["base_color"], (0.48, 0.64, 0.8), atol=1e-6)
 
 
 def test_circles_end(tmp_path: Path) -> None:

@@ -164,9 +164,12 @@ class Importing:
         """A file that holds materials alone: they wait among the materials until they are used."""
         for note in model.notes:
             self._context.journal.write(f"{path.name}: {note}", "warning")
-        names = " and ".join(material.name for material in model.materials)
+        count = len(model.materials)
+        few = " and ".join(material.name for material in model.materials[:3])
+        names, it = (few, "them" if count > 1 else "it") if count < 4 else (f"{count} materials", "them")
         if self._context.editing.apply(Add((), model.materials, f"Import {names}")):
-            self._context.journal.write(f"{names} is among the materials now: drag it onto an object.")
+            verb = "is" if count == 1 else "are"
+            self._context.journal.write(f"{names} {verb} among the materials now: drag {it} onto an object.")
 
     def _filters(self) -> list[Filter]:
         if not self._context.warm:
