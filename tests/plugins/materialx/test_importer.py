@@ -154,7 +154,8 @@ def test_channels_as_older_files_name_them(tmp_path: Path) -> None:
     pixels = picture(tmp_path)
     graph = (
         '<nodegraph name="g"><image name="i" type="vector3">'
-        '<input name="file" type="filename" value="wood.png"/></image><output name="orm" type="vector3" nodename="i"/></nodegraph>'
+        '<input name="file" type="filename" value="wood.png"/></image>'
+        '<output name="orm" type="vector3" nodename="i"/></nodegraph>'
     )
     reached = 'type="float" nodegraph="g" output="orm" channels="{}"'
     used = shader("gltf_pbr", metallic=reached.format("z"), roughness=reached.format("y"))
