@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from oracles.raycast import nearest
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtGui import QDragEnterEvent, QDragMoveEvent
-from PySide6.QtWidgets import QApplication, QLineEdit, QToolButton
+from PySide6.QtWidgets import QApplication, QLineEdit, QToolButton, QWidget
 from ui_support import Driver, Make, room
 
 from studio_core.edits import Add, AddMaterial, Assign, SetMaterial, SetTexture
@@ -343,6 +343,20 @@ def test_a_pattern_has_a_size_in_metres_and_is_turned(driver: Driver) -> None:
     driver.until(lambda: "Objects differ" in row.told.text())
 
 
+def widest(form: QWidget) -> int:
+    """Pixels that the widest row of a form needs."""
+    rows = form.findChildren(QWidget, options=Qt.FindChildOption.FindDirectChildrenOnly)
+    return max(row.minimumSizeHint().width() for row in rows)
+
+
+def test_a_large_picture_makes_no_form_wider_than_its_panel(driver: Driver) -> None:
+    large = Texture(Image(np.ones((1024, 1024, 3), np.uint8), "srgb"))
+    driver.document.apply(AddMaterial(Material(id="planks", name="Planks", textures={"base_color": large})))
+    panel = choose(driver, "planks")
+    assert panel.editor.textures["base_color"].text.toolTip() == "1024 × 1024 pixels"
+    assert widest(panel.editor) <= PANEL_WIDTH - 40
+
+
 def test_maps_of_a_captured_material_are_one_row(make: Make) -> None:
     driver = make(plugins=(brdfs, meshes, residual))
     driver.show(room())
@@ -357,7 +371,7 @@ def test_maps_of_a_captured_material_are_one_row(make: Make) -> None:
     panel = choose(driver, "cloth")
     form = panel.editor
     assert form.textures == {}
-    assert form.minimumSizeHint().width() <= PANEL_WIDTH - 40, "a narrow panel shows all of it"
+    assert widest(form) <= PANEL_WIDTH - 40, "a narrow panel shows all of it"
     assert form.maps.text.text() == "9 × 9, 4 maps"
     driver.until(lambda: form.maps.pattern.width_field.isEnabled())
     form.maps.pattern.width_field.setValue(0.5)

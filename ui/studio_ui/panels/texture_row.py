@@ -40,6 +40,7 @@ class TextureRow(QWidget):
         self.picture = QLabel()
         self.text = QLabel()
         self.text.setProperty("role", "dim")
+        self.text.setMinimumWidth(24)  # what narrow panels cut off is in the tip
         load = tool("open", told or f"Picture for {label.lower()}, which it is multiplied with")
         load.clicked.connect(lambda: ask())
         self.remove = tool("cancel", "Take the picture away")
@@ -66,6 +67,7 @@ class TextureRow(QWidget):
             return
         height, width = texture.image.pixels.shape[:2]
         self.text.setText(f"{width} × {height}")
+        self.text.setToolTip(f"{width} × {height} pixels")
         self.pattern.show_texture(texture, lengths)
 
 
