@@ -35,6 +35,9 @@ FEATHER = 2
 """Texels around a seam in which patches are mixed; the sample's own rim that is not used."""
 NEARLY = 0.1  # above the best: patches that are chosen among
 USED = 0.25  # what a patch costs more for each time that its place was used more than on average
+LEVEL = (
+    0.1  # what a patch costs more that takes the mean of all further from the sample's, and less otherwise
+)
 PERIODIC, PROMINENT = 0.3, 0.2  # correlation with itself that a period has, and has more than shorter shifts
 CHANNELS = 6  # principal components that are searched and cut by
 SMALLEST = 24
@@ -199,10 +202,21 @@ class _Growing:
         self.squares = np.fft.rfft2((self.signal**2).sum(axis=2)).astype(np.complex64)
         self.used = np.zeros(self._places(), np.float32)
         self.laid = 0
+        self.means = self._means()
+        self.usual = float((self.means**2).sum(axis=2).mean())
+        self.off = np.zeros(self.signal.shape[2])  # sum of all that is there; the sample's mean is 0
 
     def _places(self) -> tuple[int, int]:
         """How many places a patch may be taken from, down and across."""
         return self.height - self.side - 2 * FEATHER + 1, self.width - self.side - 2 * FEATHER + 1
+
+    def _means(self) -> F64:
+        """(…, K) the mean of a patch from each place."""
+        upto = np.pad(self.signal.astype(np.float64).cumsum(axis=0).cumsum(axis=1), ((1, 0), (1, 0), (0, 0)))
+        s, f = self.side, FEATHER
+        whole = upto[s:, s:] - upto[s:, :-s] - upto[:-s, s:] + upto[:-s, :-s]
+        rows, columns = self._places()
+        return np.asarray(whole[f : f + rows, f : f + columns] / s**2)
 
     def run(self, mending: float, job: Job | None) -> Grown:
         """Lay all patches, then mend."""
@@ -261,7 +275,10 @@ class _Growing:
 
     def _take(self, window: tuple[I64, I64], taken: Bools, place: tuple[int, int]) -> None:
         rows, columns = (np.broadcast_to(part, taken.shape)[taken] for part in window)
-        self.source[rows, columns] = self._patch(place)[taken]
+        old = self.source[rows, columns][self.filled[rows, columns]]
+        self.off -= self.signal[old[:, 0], old[:, 1]].sum(axis=0, dtype=np.float64)
+        self.source[rows, columns] = new = self._patch(place)[taken]
+        self.off += self.signal[new[:, 0], new[:, 1]].sum(axis=0, dtype=np.float64)
         self.filled[rows, columns] = True
         y, x = place[0] - FEATHER, place[1] - FEATHER
         reach = self.side / 3
@@ -297,6 +314,9 @@ class _Growing:
         cost = cost + 1e-3
         often = self.used / max(float(self.used.mean()), 1e-30) if self.laid else self.used
         cost *= 1 + USED * np.minimum(often, 8.0)
+        if self.usual > 1e-12:
+            farther = (self.means * (2 * self.off / self.side**2 + self.means)).sum(axis=2) / self.usual
+            cost *= np.exp(LEVEL * np.clip(farther, -10, 10))
         good = np.flatnonzero(cost <= (1 + NEARLY) * cost.min())
         y, x = divmod(int(self.random.choice(good)), columns)
         return FEATHER + y, FEATHER + x
