@@ -33,6 +33,8 @@ BEND = 18
 """Floats of a vertex."""
 DARK = 1e-12
 """Typical light that nothing can be in proportion to."""
+SHORTEST = np.float32(0.1)
+"""Least length of a mean normal that is made stronger."""
 _ZERO, _ONE = np.float32(0), np.float32(1)
 
 
@@ -81,6 +83,24 @@ def add_tilts(
 
 
 @kernel
+def strengthened(
+    x: np.float32, y: np.float32, z: np.float32, strong: np.float32
+) -> tuple[np.float32, np.float32, np.float32]:
+    """Components x, y, 1 − z of a mean normal whose slopes are multiplied by `strong`.
+
+    What it is shorter by than a unit normal, the spread of what it is a mean of, grows by the square.
+    """
+    if strong == _ONE:
+        return x, y, z
+    up = _ONE - z
+    spread = max(_ONE - np.sqrt(x * x + y * y + up * up), _ZERO)
+    x, y = strong * x, strong * y
+    length = max(_ONE - strong * strong * spread, SHORTEST)
+    length /= max(np.sqrt(x * x + y * y + up * up), DARK)
+    return x * length, y * length, _ONE - up * length
+
+
+@kernel
 def add_relief(
     start: int,
     stop: int,
@@ -112,7 +132,7 @@ def add_relief(
     """Changes the radiance out (stop − start, 3) of hits start … stop−1 on what has a normal map.
 
     As for `compose.shade_hits`, whose colours `out` has; normal maps are `fine` (R, 3), where (M, L),
-    extent (M, L, 2), depth (M,) levels (0: the material has none), laid (M, 10), and
+    extent (M, L, 2), depth (M,) levels (0: the material has none), laid (M, 11), and
     tightness (F,) their texels a metre. No colour falls below 0.
     """
     for n in range(start, stop):
@@ -138,8 +158,9 @@ def add_relief(
         wc, wd = (_ONE - fx) * fy, fx * fy
         p = wa * fine[a, 0] + wb * fine[b, 0] + wc * fine[c, 0] + wd * fine[d, 0]
         q = wa * fine[a, 1] + wb * fine[b, 1] + wc * fine[c, 1] + wd * fine[d, 1]
-        x, y = laid[m, 6] * p + laid[m, 7] * q, laid[m, 8] * p + laid[m, 9] * q
         z = wa * fine[a, 2] + wb * fine[b, 2] + wc * fine[c, 2] + wd * fine[d, 2]
+        p, q, z = strengthened(p, q, z, laid[m, 10])
+        x, y = laid[m, 6] * p + laid[m, 7] * q, laid[m, 8] * p + laid[m, 9] * q
         coloured = kind[m] == AFFINE
         r, g, s = _ZERO, _ZERO, _ZERO
         if coloured:
@@ -172,4 +193,4 @@ def add_relief(
             out[n - start, channel] = max(before + more, _ZERO)
 
 
-__all__ = ["BEND", "add_relief", "add_tilts"]
+__all__ = ["BEND", "DARK", "SHORTEST", "add_relief", "add_tilts", "strengthened"]

@@ -2,10 +2,10 @@
 
 A picture under `NORMAL` holds unit normals n of the tangent frame (`scene.tangents`: x along u, y along v) as
 t = (n + 1) / 2, green up as in glTF; the value of the same name is its strength, which multiplies x and y
-before n is made unit again. Vertices know how their light changes with the normal
-(`LayerRadiance.tilts`): as a sum of x, y and 1 − z, the functions whose sum with a constant Lambert's light
-is until some of it sets. Being linear in texels, it may be averaged over mip levels as it stands, and so over
-what a pixel covers.
+before n is made unit again (pixels do so with the mean that they read, `kernels.relief.strengthened`).
+Vertices know how their light changes with the normal (`LayerRadiance.tilts`): as a sum of x, y and 1 − z,
+the functions whose sum with a constant Lambert's light is until some of it sets. Being linear in texels, it
+may be averaged over mip levels as it stands, and so over what a pixel covers.
 
 The changes are differences between normals that lie as steep as those of the picture: `slope`, `REACH` times
 the root mean square of its slopes, in whole steps of √2, so that a slider of the strength seldom asks for
@@ -32,7 +32,9 @@ LOWEST = 0.05
 """Smallest z of a texel: steeper ones are as steep."""
 REACH = 1.2
 FLATTEST, STEEPEST = 1 / 64, 1.0
-"""Slopes between which light is looked at; pictures whose slopes are under half the first are none."""
+"""Slopes between which light is looked at."""
+FLAT = 1 / 128
+"""Pictures whose mean slope is less are flat: rounding to 8 bits makes more than half of that."""
 _ENOUGH = 1 << 20  # texels for the mean of the slopes
 
 
@@ -76,9 +78,9 @@ def of_heights(image: Image, high: float) -> Image:
     return Image(np.rint((normals + 1) * np.float32(127.5)).astype(np.uint8), "data")
 
 
-def components(image: Image, strong: float) -> F32:
-    """(H, W, 3) x, y and 1 − z in the picture's own frame, rows from v = 0 up."""
-    made = np.ascontiguousarray(unit_normals(image, strong)[::-1])
+def components(image: Image) -> F32:
+    """(H, W, 3) x, y and 1 − z in the picture's own frame at strength 1, rows from v = 0 up."""
+    made = np.ascontiguousarray(unit_normals(image)[::-1])
     made[..., 2] = np.float32(1) - made[..., 2]
     return made
 
@@ -103,18 +105,16 @@ def mean_slope(image: Image) -> float:
 def slope_of(material: Material, mean: Callable[[Image], float] = mean_slope) -> float:
     """The slope at which light is looked at for a material's normal map; 0 where none acts."""
     texture = normal_texture(material)
-    if texture is None:
+    if texture is None or (own := mean(texture.image)) < FLAT:
         return 0.0
-    found = REACH * abs(strength(material)) * mean(texture.image)
-    if found < FLATTEST / 2:
-        return 0.0
+    found = max(REACH * abs(strength(material)) * own, FLATTEST)
     stepped = math.exp2(round(2 * math.log2(found)) / 2)
     return min(max(stepped, FLATTEST), STEEPEST)
 
 
 def normals_at(texture: Texture, strong: float, uvs: F32) -> F32:
     """(P, 3) unit normals of the finest level at texture coordinates (P, 2): bilinear, repeated."""
-    texels = components(texture.image, strong)
+    texels = unit_normals(texture.image, strong)[::-1]
     height, width = texels.shape[:2]
     at = texture.placed(uvs).astype(np.float64)
     x, y = at[:, 0] * width - 0.5, at[:, 1] * height - 0.5
@@ -125,7 +125,6 @@ def normals_at(texture: Texture, strong: float, uvs: F32) -> F32:
     low = texels[below, left] * (1 - fx) + texels[below, right] * fx
     high = texels[above, left] * (1 - fx) + texels[above, right] * fx
     made = low * (1 - fy) + high * fy
-    made[:, 2] = 1 - made[:, 2]
     made[:, :2] = made[:, :2] @ np.array(turn(texture)).reshape(2, 2).T
     return np.asarray(made / np.linalg.norm(made, axis=1, keepdims=True), np.float32)
 

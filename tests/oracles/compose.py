@@ -125,7 +125,9 @@ class Painter:
             look, footprint = read(self.maps[m], self.uv[m])
         normal = None
         if self.tilts is not None and self.bumps[m] is not None:
-            normal, covered = read(*self.bumps[m])
+            levels, place, strong, turn = self.bumps[m]
+            normal, covered = read(levels, place)
+            normal = leaning(normal, strong, turn)
             footprint = covered if footprint is None else (footprint, covered)
         if away > 0 and mesh.back_faces[face, 0] != NO_BACK:
             corners = mesh.back_faces[face]
@@ -157,18 +159,26 @@ def place_in_picture(texture):
 
 
 def bumps(texture, strength):
-    """Levels of (x, y, 1 − z) on the surface, and the place in the picture."""
+    """Levels of (x, y, 1 − z) in the picture, the place in it, the strength, and how it lies turned."""
     n = texture.image.pixels.astype(np.float64)[::-1] / 127.5 - 1
     n[..., 2] = np.maximum(n[..., 2], 0.05)
-    n[..., :2] *= strength
     n /= np.linalg.norm(n, axis=2, keepdims=True)
-    lies = (n[..., 0] * np.sign(texture.scale[0]) + 1j * n[..., 1] * np.sign(texture.scale[1])) * np.exp(
-        1j * np.radians(texture.rotation)
-    )
-    levels = [np.stack([lies.real, lies.imag, 1 - n[..., 2]], axis=2)]
+    levels = [np.stack([n[..., 0], n[..., 1], 1 - n[..., 2]], axis=2)]
     while max(levels[-1].shape[:2]) > 1 and len(levels) < 12:
         levels.append(halved(levels[-1]))
-    return levels, place_in_picture(texture)
+    turn = np.sign(texture.scale), np.exp(1j * np.radians(texture.rotation))
+    return levels, place_in_picture(texture), strength, turn
+
+
+def leaning(found, strength, turn):
+    """What a mean of (x, y, 1 − z) is on the surface, stronger."""
+    mean = np.array([found[0], found[1], 1 - found[2]])
+    short = 1 - np.linalg.norm(mean)
+    mean[:2] *= strength
+    mean *= (1 - strength**2 * short) / np.linalg.norm(mean)
+    (right, up), around = turn
+    lies = (right * mean[0] + 1j * up * mean[1]) * around
+    return np.array([lies.real, lies.imag, 1 - mean[2]])
 
 
 def on_dome(eye, along, radius):

@@ -115,7 +115,9 @@ BUMPS = Texture(Image(RNG.integers(60, 256, (23, 31, 3), dtype=np.uint8), "data"
 SCENES = {
     "normal map": scene_of(**ROUGH, textures=frozen_map({"normal": BUMPS})),
     "normal map of small texels": scene_of(
-        **ROUGH, textures=frozen_map({"normal": dataclasses.replace(BUMPS, scale=(40.0, -25.0))})
+        model="ggx",
+        values=frozen_map({"normal": 1.7}),
+        textures=frozen_map({"normal": dataclasses.replace(BUMPS, scale=(40.0, -25.0))}),
     ),
     "picture and normal map": scene_of(
         model="ggx", textures=frozen_map({**COLOURED["textures"], "normal": BUMPS})

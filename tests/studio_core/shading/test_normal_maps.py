@@ -164,6 +164,9 @@ def test_maps_stay_while_pictures_do():
     assert moved is not made
     first = made.texels[: TEXELS * TEXELS].reshape(TEXELS, TEXELS, 3)
     np.testing.assert_allclose(first[..., :2], unit_normals(ripples())[::-1][..., :2], atol=1e-6)
+    stronger = table([bumpy(ripples(), strong=2.0), bumpy(None)])
+    assert stronger.texels is moved.texels
+    assert stronger.laid[0, 10] == 2
     last = made.texels[made.first[0, 5]]
     np.testing.assert_allclose(last, first.mean(axis=(0, 1)), atol=1e-5)
 

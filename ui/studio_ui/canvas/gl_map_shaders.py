@@ -14,6 +14,7 @@ uniform float u_levels;
 uniform vec3 u_relief_uv_u;
 uniform vec3 u_relief_uv_v;
 uniform vec4 u_relief_turn;    // of the picture on the surface: two rows on (x, y)
+uniform float u_relief_strength;
 uniform vec4 u_relief_sizes;
 uniform float u_relief_levels;
 uniform sampler2D u_relief;
@@ -76,4 +77,17 @@ vec3 texel(sampler2D map, vec4 level, vec2 uv, vec3 uv_u, vec3 uv_v, vec2 atlas)
     vec3 c = texture2D(map, vec2(low.x, high.y)).rgb, d = texture2D(map, high).rgb;
     return mix(mix(a, b, part.x), mix(c, d, part.x), part.y);
 }
+
+#ifdef RELIEF
+// Components x, y, 1 - z of a mean normal whose slopes are multiplied; see kernels.relief.
+vec3 strengthened(vec3 n) {
+    if (u_relief_strength == 1.0) return n;
+    vec3 way = vec3(n.xy, 1.0 - n.z);
+    float spread = max(1.0 - length(way), 0.0);
+    way.xy *= u_relief_strength;
+    float left = max(1.0 - u_relief_strength * u_relief_strength * spread, SHORTEST);
+    way *= left / max(length(way), DARK);
+    return vec3(way.xy, 1.0 - way.z);
+}
+#endif
 """

@@ -55,7 +55,7 @@ class Atlases:
             wanted = np.flatnonzero(maps.kind).tolist()
             starts = {m: (int(maps.kind[m]), int(maps.first[m, 0])) for m in wanted}
             self._of = self._followed(self._of, starts, lambda m: _levels(maps, m))
-        if reliefs is not self._reliefs:
+        if not _same_texels(reliefs, self._reliefs):
             starts = {}
             if reliefs is not None:
                 starts = {m: (0, int(reliefs.first[m, 0])) for m in np.flatnonzero(reliefs.levels).tolist()}
@@ -129,6 +129,11 @@ def picture(pixels: F32, internalformat: str) -> Any:
         interpolation="nearest",
         wrapping="clamp_to_edge",
     )
+
+
+def _same_texels(a: Reliefs | None, b: Reliefs | None) -> bool:
+    """Whether nothing but how normal maps lie and their strength differs."""
+    return a is b or (a is not None and b is not None and a.texels is b.texels and a.first is b.first)
 
 
 def _levels(maps: Maps, material: int) -> list[F32]:

@@ -226,7 +226,8 @@ class Renderer:
             program["a_uv"] = body.shape.uvs.buffer
         if fine is not None:
             _lay(program, "u_relief_", fine, batch.relief_map)
-            program["u_relief_turn"] = batch.relief_map[6:]
+            program["u_relief_turn"] = batch.relief_map[6:10]
+            program["u_relief_strength"] = batch.relief_map[10]
             program["u_relief"] = fine.textures[0]
             for number in range({CONSTANT: 3, AFFINE: 6}.get(batch.kind, 4)):
                 program[f"a_bend{number}"] = body.bends[number].buffer

@@ -7,7 +7,7 @@ written, so that half floats keep their precision where the display shows it.
 from __future__ import annotations
 
 from studio_core.kernels.compose import AFFINE, CAUGHT, GENERAL
-from studio_core.kernels.relief import DARK
+from studio_core.kernels.relief import DARK, SHORTEST
 from studio_ui.canvas.gl_map_shaders import MAPS
 from studio_ui.canvas.gl_sky_shaders import SKY
 from studio_ui.canvas.grid import LIFT, REACH, STEPS, WIDE
@@ -140,6 +140,7 @@ EACH    light += texel(u_map@, level, v_uv, u_uv_u, u_uv_v, u_sizes.zw) * v_sum@
 #ifdef RELIEF
     vec4 fine = map_level(v_uv, u_relief_uv_u, u_relief_uv_v, u_relief_sizes.xy, u_relief_levels);
     vec3 n = texel(u_relief, fine, v_uv, u_relief_uv_u, u_relief_uv_v, u_relief_sizes.zw);
+    n = strengthened(n);
     n.xy = vec2(dot(u_relief_turn.xy, n.xy), dot(u_relief_turn.zw, n.xy));
     vec3 more = n.x * v_bend0 + n.y * v_bend1 + n.z * v_bend2;
 #ifdef AFFINE
@@ -342,7 +343,7 @@ def mesh_program(
     more = (("PEELED",) if peeled else ()) + (("MAPPED", "RELIEF") if relief else ())
     names = dict.fromkeys(("LIT", *_NAMES.get(kind, ()), *more))
     defines = "".join(f"#define {name}\n" for name in names)
-    defines += f"#define LEVELS {levels}\n#define DARK {DARK:e}\n"
+    defines += f"#define LEVELS {levels}\n#define DARK {DARK:e}\n#define SHORTEST {SHORTEST:f}\n"
     vertex, fragment = (_for_each(source, terms) for source in (MESH_VERTEX, MESH_FRAGMENT))
     return _defined(vertex, defines), _defined(fragment, defines)
 
