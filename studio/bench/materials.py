@@ -19,6 +19,7 @@ PARTS = (
     "studio.bench.materials_scene",
     "studio.bench.materials_captured",
     "studio.bench.materials_btf",
+    "studio.bench.materials_sources",
 )
 
 

@@ -18,11 +18,12 @@ from studio_core.errors import InputError
 from studio_core.imaging.photograph_decode import RAW
 from studio_core.imaging.photograph_read import PHOTOGRAPHS
 from studio_plugins.residual.lights import LightList, key_of, lights_for, read_list
-from studio_plugins.residual.names import Told, told_by
+from studio_plugins.residual.names import Told, structure, told_by
 from studio_plugins.residual.samples import F64
 
 _DEEPEST = 3
 _MOST = 20_000  # pictures
+_MOST_STRAYS = 2 / 3  # of all names are alike at least
 _MASKS = ("mask", "matte")
 _DARKS = ("dark", "ambient", "black", "off", "nolight", "no_light", "no-light", "background")
 _LISTS = ("lights.csv", "lights.txt", "lights.tsv", "angles.csv", "angles.txt")
@@ -70,7 +71,9 @@ def look_through(
     if listed is not None and not isinstance(listed, LightList):
         listed = LightList(listed, {})
     if listed is None and directions and any(one.azimuth is None for one in told_by(rest)):
-        found = _list_in(folder)
+        rest, more = _without_strays(rest)
+        notes += more
+        found = None if more else _list_in(folder)
         if found is not None:
             listed = read_list(found)
             notes.append(f"Lights are those of {found.name}, which lies among the pictures.")
@@ -124,6 +127,17 @@ def _called(name: str, words: Sequence[str]) -> bool:
     path = Path(name)
     parts = [path.stem.lower(), *(part.lower() for part in path.parts[:-1])]
     return any(part == word or part.startswith((f"{word}_", f"{word}-")) for part in parts for word in words)
+
+
+def _without_strays(names: list[str]) -> tuple[list[str], list[str]]:
+    """Without a few that are called otherwise, if the others then tell their lights; a sentence."""
+    kinds = [structure(name) for name in names]
+    usual = max(dict.fromkeys(kinds), key=kinds.count, default=frozenset())
+    some = [name for name, kind in zip(names, kinds, strict=True) if kind == usual]
+    strays = [name for name in names if name not in some]
+    if len(some) < max(3, _MOST_STRAYS * len(names)) or any(t.azimuth is None for t in told_by(some)):
+        return names, []
+    return some, [f"{', '.join(strays)}: left out, for the name tells no light"]
 
 
 def _list_in(folder: Path) -> Path | None:

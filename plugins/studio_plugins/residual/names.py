@@ -85,6 +85,11 @@ def told_by(names: Sequence[str]) -> list[Told]:
     return made
 
 
+def structure(name: str) -> frozenset[tuple[int, int, str]]:
+    """Where numbers stand in a name: alike for all pictures of a set, not for what else lies there."""
+    return frozenset(_numbers(_exposure(name)[1]))
+
+
 def _exposure(name: str) -> tuple[Told, str, bool]:
     """The exposure, the name without it, and whether it might be a mere count (`exp3`)."""
     path = PurePosixPath(name.replace("\\", "/"))

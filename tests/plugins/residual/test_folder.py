@@ -50,6 +50,16 @@ def test_a_list_among_the_pictures_is_used_where_names_tell_nothing(tmp_path: Pa
     assert "lights.csv" in found.notes[0]
 
 
+def test_a_few_other_pictures_among_them_are_left_out(tmp_path: Path) -> None:
+    filled(tmp_path, *(f"cloth{a}.jpg" for a in (-30, -10, 20, 40)), "setup.jpg")
+    found = look_through(tmp_path)
+    assert [g.name for g in found.groups] == ["cloth-10.jpg", "cloth-30.jpg", "cloth20.jpg", "cloth40.jpg"]
+    assert found.notes == ("setup.jpg: left out, for the name tells no light",)
+    filled(tmp_path, "one.jpg", "two.jpg", "three.jpg")
+    with pytest.raises(InputError, match=r"tells no light"):
+        look_through(tmp_path)
+
+
 def test_lists_may_name_folders_and_paths(tmp_path: Path) -> None:
     filled(tmp_path, *(f"lamp {c}/{k}.jpg" for c in "ab" for k in (1, 2)))
     listed = tmp_path / "where.csv"
