@@ -21,6 +21,7 @@ from studio_core.scene.nodes import Material, MeshObject, Node, Scene
 if TYPE_CHECKING:
     from studio_core.capturing.artifacts import CaptureState
     from studio_core.capturing.settings import CaptureSettings
+    from studio_core.fitting import FitRequest, Fitted
     from studio_core.imaging.photograph import Photograph
     from studio_core.shading.cache import DiskCache
     from studio_core.shading.job import Job
@@ -240,6 +241,19 @@ class CaptureRun(Protocol):
         ...
 
 
+class Fitter(Protocol):
+    """Makes materials out of photographs of a sample under known lamps."""
+
+    label: str
+
+    def fit(self, request: FitRequest, job: Job) -> Fitted:
+        """Read, fit and measure; for a thread of its own, it takes minutes.
+
+        Raises InputError in one sentence where the photographs give no material, and Cancelled.
+        """
+        ...
+
+
 @dataclass(frozen=True)
 class Services:
     """What the composition root hands to backends: threads, registry, cache folder."""
@@ -256,6 +270,7 @@ __all__ = [
     "CaptureRun",
     "Capturer",
     "Exporter",
+    "Fitter",
     "ImportedModel",
     "Importer",
     "Job",

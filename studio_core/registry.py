@@ -24,6 +24,7 @@ _NEEDS = {
     "exporter": ("label", "extensions", "save"),
     "panel": ("title", "make"),
     "capturer": ("label", "open"),
+    "fitter": ("label", "fit"),
 }
 _BUNDLED = "studio_plugins."
 _MOST_FAILURES = 200

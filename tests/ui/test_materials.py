@@ -307,7 +307,8 @@ def test_a_kind_is_fitted_to_a_measurement(driver: Driver) -> None:
 def test_the_plus_makes_a_material_or_opens_the_library(driver: Driver) -> None:
     panel = panel_of(driver)
     plus = next(b for b in panel.findChildren(QToolButton) if b.toolTip() == "New material")
-    new, library = plus.menu().actions()
+    new, library, photographs = plus.menu().actions()
+    assert photographs.text() == "Material from photographs…"
     new.trigger()
     assert driver.document.scene.material(panel.material).name == "Material"
     library.trigger()

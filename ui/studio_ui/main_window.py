@@ -41,6 +41,7 @@ from studio_ui.library.palette_entries import library_entries
 from studio_ui.library.taking import Taking
 from studio_ui.look.appearance import Appearance
 from studio_ui.look.badge import Badge
+from studio_ui.material_fit.feature import MaterialFitting
 from studio_ui.menus import Menus
 from studio_ui.objects.arranging import Arranging
 from studio_ui.objects.choosing import Choosing
@@ -118,6 +119,7 @@ class MainWindow(QMainWindow):
             load,
             self.capture.take,
             self.taking,
+            self.fitting.show,
         )
         room = FirstRoom(context, self.rooms.add, self.viewing.frame_all, self._samples)
         over = self.drops.overlay
@@ -141,6 +143,7 @@ class MainWindow(QMainWindow):
             self.backend_watch.bar.set_theme,
             self.aids.set_theme,
             self.toolbar.set_theme,
+            self.fitting.set_theme,
             *(panel.set_theme for panel in self.panels.values()),
         ]
         self.appearance.start([self.actions_.set_theme, viewport.set_theme, self.hints.set_theme, *wearers])
@@ -179,6 +182,7 @@ class MainWindow(QMainWindow):
         self.layouts = Layouts(self.layout_, settings, self.ask)
         self.panels, self.docks = self.layout_.panels, self.layout_.docks
         self.capture = CaptureFeature(context, self.capture_panel, lambda: self.layout_.show("capture"))
+        self.fitting = MaterialFitting(self, context, self.ask, self.library, self.taking)
         self.keyboard = Keyboard(self, lambda: viewport.inner.widget, self.docks)
         chosen = PreferencesFeature(
             self, self.preferences, self.shortcuts, context.tasks, user_cache() / "computed"
@@ -220,6 +224,7 @@ class MainWindow(QMainWindow):
             Help(self, context, settings, self.shortcuts, self.viewing.mouse),
             self.rooms,
             self.capture,
+            self.fitting,
         ]
 
     def _panels(self) -> list[tuple[Panel, Qt.DockWidgetArea]]:
@@ -318,6 +323,7 @@ class MainWindow(QMainWindow):
         self.context.feed.close()
         self.context.tasks.cancel()
         self.pictures.close()
+        self.fitting.close()
         self.files.close()
         self.following.close()
         self.effects.close()

@@ -14,6 +14,7 @@ window.
   robust), `refine` (light directions and strengths), `fit` puts them in order and chooses
 - what came of it: `result`, `errors`, `splits`, `frames` (tangent space)
 - in a scene: `model` (the reflectance model `captured`), `material` (a fit as a material), `backend`
+- from the window: `reading` (a request's photographs as samples), `fitter` (the registry's kind)
 
 Values are radiance under a light of strength 1, by which a white matte surface that faces it has the value 1
 (irradiance π). The camera looks along −z: x to the right, y up, z towards the camera.
@@ -28,5 +29,6 @@ plugin = Plugin(
     provides={
         "brdf": {"captured": "studio_plugins.residual.model:MODEL"},
         "backend": {"residual": "studio_plugins.residual.backend:BACKEND"},
+        "fitter": {"photographs": "studio_plugins.residual.fitter:FITTER"},
     },
 )

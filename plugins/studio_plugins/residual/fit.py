@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -39,11 +40,16 @@ def fit(samples: Samples, settings: Settings | None = None, job: Job | None = No
         raise InputError(
             "the material cannot be fitted: hardly anything is lit and not clipped in the pictures"
         )
-    total = settings.refine + 3
-    model = best_parametric(samples, settings.models, use=use)
-    job.checkpoint(1, total)
+    searched = len(settings.models)
+    total = searched + 2 + (settings.refine + settings.refine - 1 + searched if settings.refine else 0)
+    done = itertools.count(1)
+
+    def step() -> None:
+        job.checkpoint(next(done), total)
+
+    model = best_parametric(samples, settings.models, use=use, step=step)
     lights = samples.lights
-    for step in range(settings.refine):
+    for turn in range(settings.refine):
         mended = None
         if settings.table:
             some = _Texels.of(samples, _spread(samples, use), settings)
@@ -51,15 +57,16 @@ def fit(samples: Samples, settings: Settings | None = None, job: Job | None = No
         shared = Shared(model, mended)
         samples = samples.lit_by(refined(samples, shared, _albedo(samples, shared, settings), use))
         use = _trusted(samples, settings)
-        models = settings.models if step == settings.refine - 1 else (model.model,)
-        model = best_parametric(samples, models, use=use)
-        job.checkpoint(2 + step, total)
+        step()
+        models = settings.models if turn == settings.refine - 1 else (model.model,)
+        model = best_parametric(samples, models, use=use, step=step)
     texels = _Texels.of(samples, _spread(samples, use), settings)
     shared, basis, tried = _chosen(texels, model, settings)
     if settings.table and shared.table is not None:
         shared = Shared(model, texels.table(model, np.ones(len(samples.lights), np.bool_)))
-    job.checkpoint(total - 1, total)
+    step()
     coefficients, rank = _coefficients(samples, shared, basis, settings)
+    step()
     return ResidualFit(
         shared,
         basis,

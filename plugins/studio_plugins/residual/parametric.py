@@ -26,7 +26,7 @@ Fresnel's change is left out: under one camera and lights within 60° of it, it 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -170,10 +170,20 @@ def fit_parametric(samples: Samples, model: str, use: Flags | None = None) -> Pa
 
 
 def best_parametric(
-    samples: Samples, models: Sequence[str], use: Flags | None = None, gain: float = 0.03
+    samples: Samples,
+    models: Sequence[str],
+    use: Flags | None = None,
+    gain: float = 0.03,
+    step: Callable[[], object] = lambda: None,
 ) -> Parametric:
-    """Of several models the first whose error none of the later ones betters by more than `gain` of it."""
-    made = [fit_parametric(samples, model, use) for model in models]
+    """Of several models the first whose error none of the later ones betters by more than `gain` of it.
+
+    `step()` is called after each of them.
+    """
+    made = []
+    for model in models:
+        made.append(fit_parametric(samples, model, use))
+        step()
     best = made[0]
     for one in made[1:]:
         if one.nmse < best.nmse * (1 - gain):

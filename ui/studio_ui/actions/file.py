@@ -23,6 +23,8 @@ ITEMS: tuple[Item, ...] = (
                icon="environment"),
     ActionSpec("file.capture", "Capture a room's light…", "File", "",
                "From photographs of a room at several exposures, front and back", icon="capture"),
+    ActionSpec("file.fit_material", "Material from photographs…", "File", "",
+               "Cloth, stone or paint from photographs of a sample under known lamps", icon="material"),
     SEPARATOR,
     ActionSpec("file.export_picture", "Export picture…", "File", "Ctrl+E",
                "In any size, for the screen or for print", icon="picture", enabled="picture"),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
+from itertools import chain, islice
 from pathlib import Path
 
 from PySide6.QtCore import QMimeData, QSize
@@ -20,6 +21,8 @@ CAMERAS = (
 )
 """Files of cameras that are photographs of a room and nothing else."""
 PHOTOGRAPHS = (".png", ".jpg", ".jpeg", ".webp", ".bmp")
+_PICTURES = frozenset((*HDR, *CAMERAS, *PHOTOGRAPHS))
+_LOOKED_AT, _FOLDERS = 200, 3  # of a folder's entries, and of folders in it
 _SMALL, _BLACK = (64, 32), 48  # size that is looked at, and what is dark of 255
 _TWICE = 0.02  # how far from 2:1 the sides of an equirectangular picture may be
 
@@ -35,6 +38,7 @@ class Intent:
     material: bool = False
     materials: tuple[Path, ...] = ()
     capture: tuple[Path, ...] = ()
+    samples: Path | None = None  # a folder of photographs of a material
     problem: str = ""
 
     def __bool__(self) -> bool:
@@ -45,6 +49,7 @@ class Intent:
             or self.material
             or bool(self.materials)
             or bool(self.capture)
+            or self.samples is not None
         )
 
     def told(self, *, here: bool, options: bool, whom: str = "") -> str:
@@ -55,6 +60,8 @@ class Intent:
             return self.problem
         if self.project is not None:
             return f"Open {self.project.stem}"
+        if self.samples is not None:
+            return f"Make a material of the photographs in {self.samples.name}"
         if self.capture:
             count = len(self.capture)
             return f"Capture the room's light from {count} photograph{'s' * (count > 1)}"
@@ -99,6 +106,8 @@ def intent(data: QMimeData, known: Collection[str]) -> Intent | None:
 
 def intent_of(paths: Sequence[Path], known: Collection[str]) -> Intent:
     """What dropping files would do. With `known` empty everything unknown may be a model."""
+    if len(paths) == 1 and holds_photographs(paths[0]):
+        return Intent(samples=paths[0])
     models: list[Path] = []
     lights: list[Path] = []
     materials: list[Path] = []
@@ -137,6 +146,19 @@ def intent_of(paths: Sequence[Path], known: Collection[str]) -> Intent:
             return Intent(problem=problem)
         return Intent(models=tuple(models), light=lights[0], photograph=True)
     return Intent(models=tuple(models), light=lights[0] if lights else None)
+
+
+def holds_photographs(folder: Path) -> bool:
+    """Whether pictures lie in a folder or in a folder in it, as far as a short look tells."""
+    try:
+        if not folder.is_dir():
+            return False
+        some = list(islice(folder.iterdir(), _LOOKED_AT))
+        inner = (path for path in some if path.is_dir())
+        more = (islice(path.iterdir(), _LOOKED_AT) for path in islice(inner, _FOLDERS))
+        return any(path.suffix.lower() in _PICTURES for path in chain(some, *more))
+    except OSError:
+        return False
 
 
 def _two_circles(path: Path) -> bool:

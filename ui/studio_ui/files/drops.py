@@ -38,12 +38,13 @@ class Drops(QObject):
         load_environment: Callable[[Path], object],
         capture: Callable[[Sequence[Path]], object],
         taking: Taking,
+        fit: Callable[[Path], object],
     ) -> None:
         super().__init__(window)
         self.overlay = DropOverlay()
         self._window, self._context, self._viewport, self._ask = window, context, viewport, ask
         self._files, self._importing, self._load = files, importing, load_environment
-        self._capture, self._taking = capture, taking
+        self._capture, self._taking, self._fit = capture, taking, fit
         self._intent: Intent | None = None
         window.setAcceptDrops(True)
         window.installEventFilter(self)
@@ -126,6 +127,8 @@ class Drops(QObject):
         if meant.project is not None:
             self._files.open(meant.project)
             return
+        if meant.samples is not None:
+            self._fit(meant.samples)
         if meant.capture and self._ask.capture(len(meant.capture)):
             self._capture(meant.capture)
         if meant.light is not None and (not meant.photograph or self._ask.photograph(meant.light.name)):

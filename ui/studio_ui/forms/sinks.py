@@ -99,3 +99,32 @@ class PlainSink:
     def apply(self, name: str, value: Value) -> None:
         """Tell at once."""
         self._told(name, value)
+
+
+class LiveSink(PlainSink):
+    """Tells while a hand drags, and puts back what was there when it gives up."""
+
+    def __init__(self, told: Callable[[float], object], now: Callable[[], float]) -> None:
+        super().__init__(lambda name, value: None)
+        self._say, self._now, self._before = told, now, 0.0
+
+    def begin(self, name: str) -> bool:
+        """Remember."""
+        self._before = self._now()
+        return True
+
+    def preview(self, name: str, value: Value) -> None:
+        """At once."""
+        self.apply(name, value)
+
+    def commit(self) -> None:
+        """Nothing is left to tell."""
+
+    def cancel(self) -> None:
+        """As before."""
+        self._say(self._before)
+
+    def apply(self, name: str, value: Value) -> None:
+        """At once."""
+        assert isinstance(value, int | float)
+        self._say(float(value))

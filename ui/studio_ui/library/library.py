@@ -93,17 +93,21 @@ class MaterialLibrary:
     def keep(self, materials: Sequence[Material], tags: Iterable[str] = ()) -> None:
         """Put materials on the shelf, for all projects."""
         words = tuple(tags)
+        self.keep_kept([Kept(material, words) for material in materials])
+
+    def keep_kept(self, found: Sequence[Kept]) -> None:
+        """The same with what they are found by."""
 
         def put(job: Job) -> list[Path]:
-            return [self.shelf.put(Kept(material, words)) for material in materials]
+            return [self.shelf.put(kept) for kept in found]
 
         def done(paths: list[Path]) -> None:
             names = ", ".join(path.stem for path in paths)
             self._context.journal.write(f"Kept for all projects: {names}.")
             self._put(paths)
 
-        if materials:
-            what = materials[0].name if len(materials) == 1 else f"{len(materials)} materials"
+        if found:
+            what = found[0].name if len(found) == 1 else f"{len(found)} materials"
             self._context.tasks.run(f"Keeping {what}", put, done, lambda error: self.read())
 
     def copy(self, entries: Sequence[Entry]) -> None:

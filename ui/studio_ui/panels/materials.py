@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from PySide6.QtCore import QPoint, Qt, QTimer
+from PySide6.QtGui import QAction
 from PySide6.QtWidgets import QLineEdit, QMenu, QPushButton, QSizePolicy, QSplitter, QToolButton, QWidget
 
 from studio_core.edits import AddMaterial, Compound, RemoveMaterial, SetMaterial
@@ -64,10 +65,10 @@ class MaterialsPanel(Panel):
         add = self.tool("add", "New material")
         copy = self.tool("duplicate", "Duplicate the chosen material")
         self.users = self.tool("select", "Choose the objects that have the chosen materials")
-        new = QMenu(add)
-        new.addAction("New material", self.add)
-        new.addAction("From the library…", open_library)
-        add.setMenu(new)
+        self.new = QMenu(add)
+        self.new.addAction("New material", self.add)
+        self.new.addAction("From the library…", open_library)
+        add.setMenu(self.new)
         add.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
         copy.clicked.connect(self.copy)
         self.users.clicked.connect(self.select_users)
@@ -135,6 +136,10 @@ class MaterialsPanel(Panel):
     def common(self) -> ParamForm | None:
         """What all materials have."""
         return self.editor.common
+
+    def use_actions(self, actions: Mapping[str, QAction]) -> None:
+        """One more way to a new material."""
+        self.new.addAction(actions["file.fit_material"])
 
     def close_panel(self) -> None:
         """Stop listening and making."""

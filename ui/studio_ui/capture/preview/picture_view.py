@@ -62,6 +62,7 @@ class PictureView(QWidget):
         self.hidden: set[str] = set()  # names of marks
         self.wipe = 0.5
         self.wiping = True
+        self.sides = ("before", "after")  # of the wipe
         self.remark = ""  # over the picture, say that it is an old one
         self.turning: npt.NDArray[np.float64] | None = None
         self._build = build
@@ -357,7 +358,7 @@ class PictureView(QWidget):
     def _paint_wipe(self, painter: QPainter, at: int) -> None:
         painter.setPen(QPen(QColor(self.theme.mark), 2))
         painter.drawLine(at, 0, at, self.height())
-        for text, right in (("before", True), ("after", False)):
+        for text, right in zip(self.sides, (True, False), strict=True):
             wide = painter.fontMetrics().horizontalAdvance(text) + 12
             box = QRectF(at - wide - 6 if right else at + 6, 6, wide, painter.fontMetrics().height() + 4)
             _pill(painter, box, text)

@@ -10,14 +10,14 @@ from PySide6.QtGui import QAction, QResizeEvent
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QMenu, QSizePolicy, QToolButton, QVBoxLayout, QWidget
 
 from studio_core.colour import LUMINANCE
-from studio_core.params import ParamInfo, Value
+from studio_core.params import ParamInfo
 from studio_ui.capture.preview.histogram import Histogram, HistogramView, histogram
 from studio_ui.capture.preview.picture import Shown
 from studio_ui.capture.preview.picture_view import PictureView
 from studio_ui.capture.preview.tone import linear, natural_exposure, numbers
 from studio_ui.context import Context
 from studio_ui.forms.fields import Combo, NumberField
-from studio_ui.forms.sinks import PlainSink
+from studio_ui.forms.sinks import LiveSink
 from studio_ui.look.theme import GAP, Theme
 
 _EXPOSURE = ParamInfo(
@@ -41,7 +41,7 @@ class Preview(QWidget):
         self.choice.setAccessibleName("Picture")
         self.choice.setToolTip("Which picture is shown")
         self.choice.activated.connect(lambda i: self.chosen(self.choice.itemText(i)))
-        self.exposure = NumberField("exposure", _EXPOSURE, _Live(self._expose, lambda: self.view.exposure))
+        self.exposure = NumberField("exposure", _EXPOSURE, LiveSink(self._expose, lambda: self.view.exposure))
         self.marks = QToolButton()
         self.marks.setText("Marks")
         self.marks.setToolTip("What is laid over the picture")
@@ -219,35 +219,6 @@ class Preview(QWidget):
         parts += [f"{mark.name.lower()}" for mark in shown.marks if mark.mask[y, x]]
         more = shown.say(*point)
         self.readout.setText(" · ".join([*parts, *([more] if more else [])]))
-
-
-class _Live(PlainSink):
-    """Tells while a hand drags, and puts back what was there when it gives up."""
-
-    def __init__(self, told: Callable[[float], object], now: Callable[[], float]) -> None:
-        super().__init__(lambda name, value: None)
-        self._say, self._now, self._before = told, now, 0.0
-
-    def begin(self, name: str) -> bool:
-        """Remember."""
-        self._before = self._now()
-        return True
-
-    def preview(self, name: str, value: Value) -> None:
-        """At once."""
-        self.apply(name, value)
-
-    def commit(self) -> None:
-        """Nothing is left to tell."""
-
-    def cancel(self) -> None:
-        """As before."""
-        self._say(self._before)
-
-    def apply(self, name: str, value: Value) -> None:
-        """At once."""
-        assert isinstance(value, int | float)
-        self._say(float(value))
 
 
 def _button(text: str, tip: str) -> QToolButton:
