@@ -6,9 +6,9 @@ import dataclasses
 
 import numpy as np
 import pytest
-from oracles.patterns import marble
 from scenes import floor
 
+from studio.bench.pattern_samples import marble
 from studio_core.contract import Services
 from studio_core.document import Document
 from studio_core.errors import EditError

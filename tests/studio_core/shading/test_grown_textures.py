@@ -6,8 +6,8 @@ import dataclasses
 
 import numpy as np
 import pytest
-from oracles.patterns import marble, weave
 
+from studio.bench.pattern_samples import marble, weave
 from studio_core.errors import InputError
 from studio_core.scene.geometry import Image, Texture
 from studio_core.scene.pattern import UnitLengths, pattern_size
