@@ -2,10 +2,10 @@
 
 Materials: `own` as they are; `diffuse` all Lambert; `glossy` GGX α 0.25, Blinn–Phong 40 and Phong 20 in turn;
 `sharp` GGX α 0.1 and Blinn–Phong 500 in turn. `native-…` hold only what Mitsuba has itself: every matte
-material of the room is `diffuse` of its mean colour, every glossy one white metal, Mitsuba's
-`roughconductor` (the other models, and textures, would be compared with our own translation of them); the
-environment gives light but is not seen, since nobody has to compute its pixels and the bright windows would
-be most of the picture's mean.
+material of the room is `diffuse` of its mean colour, every glossy one white metal without light between
+facets, Mitsuba's `roughconductor` (the other models, and textures, would be compared with our own translation
+of them); the environment gives light but is not seen, since nobody has to compute its pixels and the bright
+windows would be most of the picture's mean.
 """
 
 from __future__ import annotations
@@ -87,7 +87,12 @@ def _glossy(material: Material, index: int, materials: str) -> Material:
     roughness = GLOSS[materials] ** 0.5
     values: Mapping[str, Value]
     if materials.startswith("native"):
-        values = {"base_color": (1.0, 1.0, 1.0), "metallic": 1.0, "roughness": roughness}
+        values = {
+            "base_color": (1.0, 1.0, 1.0),
+            "metallic": 1.0,
+            "roughness": roughness,
+            "keep_energy": False,
+        }
         return dataclasses.replace(material, model="ggx", values=frozen_map(values), textures=frozen_map())
     textures = _base_texture(material)
     models = ["ggx", *EXPONENTS[materials]]

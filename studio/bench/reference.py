@@ -47,7 +47,7 @@ NATIVE: dict[str, tuple[str, dict[str, Any], dict[str, Any]]] = {
     ),
     "roughconductor": (
         "ggx",
-        {"base_color": (1.0, 1.0, 1.0), "metallic": 1.0, "roughness": 0.5},
+        {"base_color": (1.0, 1.0, 1.0), "metallic": 1.0, "roughness": 0.5, "keep_energy": False},
         {"type": "roughconductor", "material": "none", "distribution": "ggx", "alpha": 0.25},
     ),
 }

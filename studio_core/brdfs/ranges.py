@@ -43,16 +43,24 @@ def shaping(brdf: Brdf) -> tuple[list[str], list[str]]:
 
 
 def shaped(brdf: Brdf, *fractions: float) -> dict[str, Value]:
-    """Defaults, with what changes the shape at these fractions of its way, the last one for all the rest."""
-    infos, names = param_infos(brdf.Params), shaping(brdf)[0]
+    """Defaults, with what changes the shape at these fractions of its way, the last one for all the rest.
+
+    Flags stay as they are: they have no way between their ends.
+    """
+    infos, names = param_infos(brdf.Params), _walked(brdf)
     each = itertools.chain(fractions, itertools.repeat(fractions[-1]))
     made = {name: at_fraction(infos[name], f) for name, f in zip(names, each, strict=False)}
     return {**defaults(brdf.Params), **made}
 
 
+def _walked(brdf: Brdf) -> list[str]:
+    infos = param_infos(brdf.Params)
+    return [name for name in shaping(brdf)[0] if infos[name].kind != "flag"]
+
+
 def shapes(brdf: Brdf, fractions: tuple[float, ...], mixed: int = 0) -> Iterator[dict[str, Value]]:
     """Defaults with the shape at each fraction; and as many mixed ones where it has several parameters."""
-    names = shaping(brdf)[0]
+    names = _walked(brdf)
     for fraction in fractions if names else fractions[:1]:
         yield shaped(brdf, fraction)
     rng = np.random.default_rng(len(names))

@@ -2,7 +2,8 @@
 
 Where one texture acts, the coefficients of most models are affine in its texel: then only the picture is
 kept as a map, and another colour, roughness or metalness costs two rows of numbers. Whether they are is
-found out by asking the model along the range of the picture's values.
+found out by asking the model along the range of the picture's values. A term that a model lets be
+`straightened` is the line nearest to it over the picture's texels.
 """
 
 from __future__ import annotations
@@ -26,9 +27,11 @@ from studio_core.shading.pyramids import LEVELS, Pyramid, joined, lay_out, pyram
 from studio_core.shading.reliefs import Reliefs, ReliefTable
 
 F32 = npt.NDArray[np.float32]
+F64 = npt.NDArray[np.float64]
 I64 = npt.NDArray[np.int64]
 
 PROBES = 33
+SAMPLED = 4096
 AFFINE_WITHIN = 1e-5  # of the largest coefficient
 
 
@@ -213,10 +216,34 @@ def _line(resolved: Resolved, picture: Pyramid) -> tuple[F32, F32] | None:
     rise = np.where(high > low, high - low, 1)
     slope = np.where(high > low, (made[PROBES - 1] - made[0]) / rise, 0)  # (T, 3)
     plain = made[0] - slope * low
+    for term in getattr(resolved.brdf, "straightened", ()):
+        texels, values = _sampled(resolved, picture, term)
+        plain[term], slope[term] = _nearest(texels, values, low)
+        made[:, term] = plain[term] + slope[term] * at
     error = np.abs(plain + slope * at[:, None, :] - made).max(initial=0)
     if not error <= AFFINE_WITHIN * np.abs(made).max(initial=0):
         return None
     return plain.ravel().astype(np.float32), slope.ravel().astype(np.float32)
+
+
+def _sampled(resolved: Resolved, picture: _Pyramid, term: int) -> tuple[F64, F64]:
+    """Texels (K, 3) from all over the picture, and the coefficient (K, 3) of a term there."""
+    rows = picture.levels[0].reshape(-1, picture.levels[0].shape[-1])[:, :3]
+    texels = np.ascontiguousarray(rows[:: max(len(rows) // SAMPLED, 1)])
+    return texels.astype(np.float64), _at_texels(resolved, texels)[:, term].astype(np.float64)
+
+
+def _nearest(texels: F64, values: F64, low: F64) -> tuple[F64, F64]:
+    """Lines (3,) at 0 and their slopes (3,) by least squares, each channel's not below 0 from `low` on."""
+    mean, height = texels.mean(axis=0), values.mean(axis=0)
+    away = texels - mean
+    spread = (away * away).sum(axis=0)
+    slope = (away * (values - height)).sum(axis=0) / np.maximum(spread, 1e-12)
+    plain = height - slope * mean
+    above = texels - low
+    lifted = (above * values).sum(axis=0) / np.maximum((above * above).sum(axis=0), 1e-12)
+    under = plain + slope * low < 0
+    return np.where(under, -lifted * low, plain), np.where(under, lifted, slope)
 
 
 def _at_texels(resolved: Resolved, texels: F32) -> F32:

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from oracles.facets import ggx_conductor, ggx_dielectric, plastic
+from oracles.facets import ggx, ggx_conductor, ggx_dielectric, plastic
 from oracles.fibres import cloth
 
 Array = npt.NDArray[np.float64]
@@ -61,30 +61,6 @@ def blinn_phong(values: Values, wo: Array, wi: Array) -> Array:
     cosine = np.clip(unit(wo + wi)[..., 2], 0, 1)
     lobe = (n + 2) * (n + 4) / (8 * np.pi * (2 ** (-n / 2) + n)) * cosine**n
     return _above(wo, wi)[..., None] * (diffuse / np.pi + specular * lobe[..., None])
-
-
-def ggx(values: Values, wo: Array, wi: Array) -> Array:
-    """(..., 3) f_r of `ggx`."""
-    above = _above(wo, wi)
-    wo, wi = np.where(above[..., None], unit(wo), [0, 0, 1]), np.where(above[..., None], unit(wi), [0, 0, 1])
-    alpha = np.maximum(np.asarray(values["roughness"], np.float64) ** 2, 1e-4)
-    base = _colour(values["base_color"])
-    metallic = np.asarray(values["metallic"], np.float64)[..., None]
-    dielectric = 0.08 * np.asarray(values["specular"], np.float64)[..., None]
-    h = unit(wo + wi)
-    no, ni, nh = wo[..., 2], wi[..., 2], h[..., 2]
-    sine = h[..., 0] ** 2 + h[..., 1] ** 2  # 1 − nh² would cancel
-    d = alpha**2 / (np.pi * (alpha**2 * nh**2 + sine) ** 2)
-
-    def masking(c: Array) -> Array:
-        return 2 / (1 + np.sqrt(1 + alpha**2 * (1 - c**2) / c**2))
-
-    f0 = dielectric * (1 - metallic) + base * metallic
-    fresnel = f0 + (1 - f0) * ((1 - (wo * h).sum(-1)) ** 5)[..., None]
-    specular = (d * masking(no) * masking(ni) / (4 * no * ni))[..., None] * fresnel
-    matte = 28 / (23 * np.pi) * base * (1 - metallic) * (1 - dielectric)
-    matte = matte * ((1 - (1 - ni / 2) ** 5) * (1 - (1 - no / 2) ** 5))[..., None]
-    return above[..., None] * (matte + specular)
 
 
 def ward(values: Values, wo: Array, wi: Array) -> Array:

@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.interpolate import CubicSpline
 
-from studio_plugins.brdfs.facets import bounce
+from studio_plugins.brdfs.facets import bounce, rim_share
 
 Array = npt.NDArray[np.float64]
 Values = Mapping[str, Any]
@@ -57,6 +57,7 @@ class Table:
             mean = float((_W * _C * fresnel(_C, index)).sum())
             self.survives = mean**2 * (1 - self.missing) / (1 - mean * self.missing)
         self.through = float((weight * self.transmitted(mu)).sum())
+        self.mu, self.weight = mu, weight
 
     def lost(self, mu: Array) -> Array:
         """1 − E."""
@@ -91,6 +92,36 @@ def _facets(values: Values, wo: Array, wi: Array) -> tuple[Array, Array, Array, 
     d = alpha**2 / (np.pi * (alpha**2 * h[..., 2] ** 2 + sine) ** 2)
     lobe = d * masking(no, alpha) * masking(ni, alpha) / (4 * no * ni)
     return above, no, ni, np.clip((wo * h).sum(-1), 0, 1), lobe, alpha
+
+
+@functools.lru_cache(64)
+def below_rim(alpha: float) -> tuple[CubicSpline, float]:
+    """1 − Y by log(1 + μ / (0.3 α)), and its mean over a white sky."""
+    place = np.linspace(0, np.log1p(1 / (0.3 * alpha)), 160)
+    mu = np.clip(0.3 * alpha * np.expm1(place), 1e-9, 1)
+    left = 1 - bounce(mu, alpha)[0] * rim_share(mu, alpha)
+    found = CubicSpline(place, left)
+    known = table(alpha)
+    return found, float((known.weight * found(np.log1p(known.mu / (0.3 * alpha)))).sum())
+
+
+def ggx(values: Values, wo: Array, wi: Array) -> Array:
+    """(..., 3) f_r of `ggx`."""
+    above, no, ni, oh, lobe, alpha = _facets(values, wo, wi)
+    base = np.asarray(values["base_color"], np.float64)
+    metallic, dielectric = float(values["metallic"]), 0.08 * float(values["specular"])
+    f0 = dielectric * (1 - metallic) + base * metallic
+    known = table(alpha)
+    left, mean = below_rim(alpha)
+    at = [left(np.log1p(mu / (0.3 * alpha))) for mu in (no, ni)]
+    matte = (at[0] * at[1] / (np.pi * mean))[..., None] * base * (1 - metallic) * (1 - dielectric)
+    linear = 0.54 - 0.81 * known.missing
+    t = np.maximum(f0 - 0.08, 0) / 0.92
+    survives = linear * f0 + (1 - linear) * 0.49 * t**2 / (1 - 0.51 * t)
+    survives = survives * float(values.get("keep_energy", True))
+    schlick = f0 + (1 - f0) * ((1 - oh) ** 5)[..., None]
+    specular = lobe[..., None] * schlick + known.multiple(no, ni)[..., None] * survives
+    return above[..., None] * (matte + specular)
 
 
 def ggx_dielectric(values: Values, wo: Array, wi: Array) -> Array:

@@ -47,7 +47,14 @@ def ggx(values: Values, wo: Array, wi: Array) -> Array:
     alpha = max(float(values["roughness"]) ** 2, 1e-4)
     h = unit(wi + wo)
     lobe = visible_normals(alpha, alpha, wo, h) / (4 * (wo * h).sum(-1))
-    return np.stack([cosine(wi), lobe, lobe], -1)
+    bounced = bounced_density(alpha, wi)
+    share = 0.02 + 0.4 * min(alpha, 1.0)
+    return np.stack([cosine(wi), (1 - share) * lobe + share * bounced, lobe, bounced], -1)
+
+
+def bounced_density(alpha: float, wi: Array) -> Array:
+    """∝ cos θ / (cos² θ + α²)."""
+    return cosine(wi) / (wi[..., 2] ** 2 + alpha**2) / np.log1p(1 / alpha**2)
 
 
 def visible_normal(wo: Array, ax: float, ay: float, u: Array) -> Array:

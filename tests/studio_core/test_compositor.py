@@ -56,7 +56,8 @@ LOOKS = {
     ),
     "plain": Material(id="look", name="Plain", model="ggx", values={"base_color": (0.9, 0.4, 0.2)}),
     "textured": Material(
-        id="look", name="Oak", model="ggx", values={"metallic": 0.3},
+        id="look", name="Oak", model="ggx",
+        values={"metallic": 0.1, "base_color": (0.4, 0.4, 0.4)},  # so that no term is straightened
         textures={"base_color": Texture(CHECKS, (3.0, 2.0), (0.2, 0.7), 25.0, 1.4)},
     ),
     "grey": Material(id="look", name="Worn", model="ggx", textures={"metallic": Texture(GREY)}),

@@ -50,6 +50,7 @@ from studio_plugins.brdfs.grain import along, grain_direction
 
 F = np.float32
 _TWO = np.float32(2.0)
+_LEAST = np.float32(1e-20)  # what is less would end among denormal numbers, which take long
 
 
 def _sharpness(default: float, way: str) -> Any:
@@ -71,13 +72,10 @@ class Params:
 
 
 @kernel
-def _facets(hx: F, hy: F, hz: F, s: Any) -> F:
-    """p(h) = √((n_u + 1)(n_v + 1)) / 2π · (n·h)^… of an unnormalised half vector."""
-    gx, gy = s[0] * hx + s[1] * hy, s[0] * hy - s[1] * hx
-    flat, height = gx * gx + gy * gy, hz * hz
-    power = (s[2] * gx * gx + s[3] * gy * gy) / max(flat, LEAST_LENGTH)
-    whole = flat + height
-    made: F = s[4] * power_of_complement(flat / whole, height / whole, HALF * power)
+def _half_power(hx: F, hy: F, flat: F, c: F, d: F, n: F, m: F) -> F:
+    """Half of n_u cos²φ + n_v sin²φ of a half vector whose level part has the square `flat`."""
+    gx, gy = c * hx + d * hy, c * hy - d * hx
+    made: F = HALF * (n * gx * gx + m * gy * gy) / max(flat, LEAST_LENGTH)
     return made
 
 
@@ -87,8 +85,8 @@ def evaluate(shape: Any, wo: Any, count: int, wi: Any, out: Any) -> None:
 
     shape: the grain's cos and sin, n_u, n_v, √((n_u + 1)(n_v + 1)) / 2π.
     """
-    a, o = carray(shape, 5), carray(wo, 3)
-    s = (a[0], a[1], a[2], a[3], a[4])
+    s, o = carray(shape, 5), carray(wo, 3)
+    c, d, n, m, peak = s[0], s[1], s[2], s[3], s[4]
     ox, oy, oz = o[0], o[1], o[2]
     directions = carray(wi, 3 * count)
     x, y, z = directions[:count], directions[count : 2 * count], directions[2 * count :]
@@ -100,9 +98,13 @@ def evaluate(shape: Any, wo: Any, count: int, wi: Any, out: Any) -> None:
         lit = ONE if (oz > ZERO and z[k] > ZERO) else ZERO
         down = max(z[k], ZERO)
         hx, hy, hz = x[k] + ox, y[k] + oy, max(down + up, LEAST_HEIGHT)
-        size = np.sqrt(hx * hx + hy * hy + hz * hz)  # twice the cosine between h and either direction
+        flat, height = hx * hx + hy * hy, hz * hz
+        whole = flat + height
+        facets = power_of_complement(flat / whole, height / whole, _half_power(hx, hy, flat, c, d, n, m))
+        size = np.sqrt(whole)  # twice the cosine between h and either direction
         fresnel = schlick_weight(HALF * size)
-        lobe = lit * HALF * _facets(hx, hy, hz, s) / (size * max(max(down, up), LEAST_HEIGHT))
+        shown = lit if facets > _LEAST else ZERO
+        lobe = shown * HALF * peak * facets / (size * max(max(down, up), LEAST_HEIGHT))
         b0[k] = lit * matte * (ONE - schlick_weight(HALF * down))
         b1[k] = lobe * (ONE - fresnel)
         b2[k] = lobe * fresnel
@@ -134,8 +136,8 @@ def sample(shape: Any, wo: Any, term: int, count: int, u: Any, wi: Any) -> None:
 @batch_function(DENSITY_SIGNATURE)
 def density(shape: Any, wo: Any, count: int, wi: Any, out: Any) -> None:
     """cos θ / π, and p(h) / (4 ω_o·h) twice; see `studio_core.contract.SampledBrdf`."""
-    a, o, w, terms = carray(shape, 5), carray(wo, 3), carray(wi, 3 * count), carray(out, 3 * count)
-    s = (a[0], a[1], a[2], a[3], a[4])
+    s, o, w, terms = carray(shape, 5), carray(wo, 3), carray(wi, 3 * count), carray(out, 3 * count)
+    c, d, n, m, peak = s[0], s[1], s[2], s[3], s[4]
     weigh_cosine(o, w, terms[:count])
     ox, oy, oz = o[0], o[1], o[2]
     x, y, z = w[:count], w[count : 2 * count], w[2 * count :]
@@ -143,8 +145,11 @@ def density(shape: Any, wo: Any, count: int, wi: Any, out: Any) -> None:
     for k in range(count):
         lit = ONE if (oz > ZERO and z[k] > ZERO) else ZERO
         hx, hy, hz = x[k] + ox, y[k] + oy, max(z[k] + oz, LEAST_HEIGHT)
-        size = np.sqrt(hx * hx + hy * hy + hz * hz)
-        drawn = lit * HALF * _facets(hx, hy, hz, s) / size
+        flat, height = hx * hx + hy * hy, hz * hz
+        whole = flat + height
+        facets = power_of_complement(flat / whole, height / whole, _half_power(hx, hy, flat, c, d, n, m))
+        shown = lit if facets > _LEAST else ZERO
+        drawn = shown * HALF * peak * facets / np.sqrt(whole)
         one[k] = drawn
         other[k] = drawn
 

@@ -1,8 +1,8 @@
 """Smooth functions of a cosine as short polynomials, which a kernel evaluates without tables or branches.
 
 What rough surfaces return varies on two scales: over the whole quarter turn, and within about α of grazing.
-s = k / (μ + k) stretches the second, and its fourth root draws both together where they are far apart;
-along these, thirteen coefficients are enough. A `Family` has such curves for every roughness.
+s = k / (μ + k) stretches the second, and a root of it draws both together where they are far apart; along
+these, thirteen coefficients are enough. A `Family` has such curves for every roughness.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ DEGREE = 12
 SIZE = 3 + DEGREE + 1
 NODES = 96
 FEW_NODES = 32
-KNOTS = 12
+KNOTS = 16
 
 
 def fit(values: Callable[[F64], F64], k: float, least: float = 0.0, power: int = 0, root: int = 1) -> F32:

@@ -6,12 +6,14 @@ returns. The rest, 1 − E, left the model with the light that bounces between f
 it survives the bounces (Kulla & Conty, "Revisiting Physically Based Shading at Imageworks", 2017, with F̄
 once more for the first bounce: Hill 2018). Ē = 2 ∫ E μ dμ, F̄ = 2 ∫ F μ dμ.
 
-Everything is integrated here when a shape is made (some milliseconds, kept by α): nothing is stored.
+Everything is integrated here, for a few roughnesses when it is first asked for (30 ms), and is a polynomial
+between them (`curves.Family`): nothing is stored.
 """
 
 from __future__ import annotations
 
 import functools
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -20,7 +22,7 @@ import numpy.typing as npt
 
 from studio_core.jit import kernel
 from studio_core.kernels.brdf import ONE, ZERO
-from studio_plugins.brdfs.curves import at, curve, fit, place
+from studio_plugins.brdfs.curves import Family, at, curve, fit, place
 
 F32 = npt.NDArray[np.float32]
 F64 = npt.NDArray[np.float64]
@@ -28,6 +30,7 @@ F64 = npt.NDArray[np.float64]
 LEAST_ALPHA = 1e-4
 LEAST_MU = 1e-3  # below, what the sharpest facets let through is continued: at 89.94°
 KEPT = 512
+_LEAST_ROOT = math.sqrt(LEAST_ALPHA)
 _NODES, _WEIGHTS = (np.asarray(a) for a in np.polynomial.legendre.leggauss(32))
 _FINE_NODES, _FINE_WEIGHTS = (np.asarray(a) for a in np.polynomial.legendre.leggauss(96))
 _HALF_NODES, _HALF_WEIGHTS = (np.asarray(a) for a in np.polynomial.legendre.leggauss(16))
@@ -41,9 +44,28 @@ def alpha_of(roughness: Any) -> float:
 def bounce(mu: npt.ArrayLike, alpha: float, index: float | None = None) -> tuple[F64, F64]:
     """(N,) E of mirrors, and (N,) the same with a dielectric's Fresnel term, for cosines (N,) > 0.
 
+    Exact within 3e-5 for α ≥ 1e-4.
+    """
+    weight, seen = _returning(mu, alpha)
+    mirrors = weight.sum(axis=(1, 2))
+    if index is None:
+        return mirrors, mirrors
+    return mirrors, (weight * fresnel(seen, index)).sum(axis=(1, 2))
+
+
+def rim_share(mu: npt.ArrayLike, alpha: float) -> F64:
+    """(N,) (1 − ω·h)^5 averaged over the facets that one bounce returns: F90's part of Schlick's term."""
+    weight, seen = _returning(mu, alpha)
+    made: F64 = (weight * (1 - seen) ** 5).sum(axis=(1, 2)) / weight.sum(axis=(1, 2))
+    return made
+
+
+def _returning(mu: npt.ArrayLike, alpha: float) -> tuple[F64, F64]:
+    """(N, A, T) what facets add to E for cosines (N,) > 0, and the cosine at which they are seen.
+
     Integrated over facets between upright and the slope where the reflection meets the horizon, which is
     known for every azimuth: x* = (sin cosφ + √(sin² cos²φ + μ²)) / μ. x = α tan ψ makes GGX's density of
-    slopes sin 2ψ dψ. Exact within 3e-5 for α ≥ 1e-4.
+    slopes sin 2ψ dψ.
     """
     m = np.asarray(mu, np.float64)[:, None, None]
     sine = np.sqrt(np.maximum(1 - m * m, 0.0))
@@ -61,11 +83,7 @@ def bounce(mu: npt.ArrayLike, alpha: float, index: float | None = None) -> tuple
     down = np.maximum(2 * facing * upright2 - m, 0.0)
     weight = np.sin(2 * psi) * end * _WEIGHTS / 2 * around
     weight = weight * facing / m * _masking(m, alpha) * _masking(down, alpha)
-    mirrors = weight.sum(axis=(1, 2))
-    if index is None:
-        return mirrors, mirrors
-    seen = np.clip(facing * np.sqrt(upright2), 0.0, 1.0)
-    return mirrors, (weight * fresnel(seen, index)).sum(axis=(1, 2))
+    return weight, np.clip(facing * np.sqrt(upright2), 0.0, 1.0)
 
 
 def _masking(cosine: F64, alpha: float) -> F64:
@@ -106,7 +124,7 @@ def hemispherical(values: Any, alpha: float) -> float:
 
 @dataclass(frozen=True)
 class Missing:
-    """1 − E of an α as a `curves.fit` of power 2 and root 4, and 1 − Ē of that fit."""
+    """1 − E of an α as a `curves.fit` of power 2, and 1 − Ē of that fit."""
 
     curve: F32
     average: float
@@ -119,15 +137,51 @@ class Missing:
 
 def left_out(found: F32, mu: npt.ArrayLike) -> F64:
     """(N,) 1 − E as kernels have it: `lost` for many cosines."""
-    return np.clip(at(found, mu, 2, 4), 0.0, 1.0)
+    return np.clip(at(found, mu, 2), 0.0, 1.0)
+
+
+@functools.cache
+def _missing() -> Family:
+    """1 − E by the roughness √α."""
+    return Family.of(
+        lambda root, mu: 1 - bounce(mu, root * root)[0], lambda root: 5 * root * root, _LEAST_ROOT, 1.0, 2
+    )
+
+
+@functools.cache
+def _rims() -> Family:
+    """`rim_share` by the roughness √α."""
+    return Family.of(
+        lambda root, mu: rim_share(mu, root * root), lambda root: 0.07 + 0.7 * root, _LEAST_ROOT, 1.0
+    )
 
 
 @functools.lru_cache(KEPT)
 def missing(alpha: float) -> Missing:
     """What one bounce leaves out."""
-    found = fit(lambda mu: 1 - bounce(mu, alpha)[0], 3 * alpha, power=2, root=4)
+    found = _missing().at(math.sqrt(alpha))
     found.flags.writeable = False
     return Missing(found, hemispherical(lambda mu: left_out(found, mu), alpha))
+
+
+@dataclass(frozen=True)
+class Rim:
+    """`rim_share` of an α as a `curves.fit`, and 1 − Ȳ, the mean of what it leaves below."""
+
+    curve: F32
+    below: float
+
+
+@functools.lru_cache(KEPT)
+def rim(alpha: float) -> Rim:
+    """What the edge's part of Schlick's term takes: Y(μ) = E(μ) · rim_share(μ)."""
+    found, gap = _rims().at(math.sqrt(alpha)), missing(alpha).curve
+    found.flags.writeable = False
+
+    def below(mu: F64) -> F64:
+        return 1 - (1 - left_out(gap, mu)) * np.clip(at(found, mu), 0.0, 1.0)
+
+    return Rim(found, hemispherical(below, alpha))
 
 
 @functools.lru_cache(KEPT)
@@ -147,7 +201,15 @@ def mean_passage(alpha: float, index: float) -> F32:
 def lost(cosine: np.float32, c: Any) -> np.float32:
     """1 − E(cosine); c is the tuple of `Missing.curve`."""
     s = place(cosine, c)
-    made: np.float32 = min(max(s * s * curve(np.sqrt(np.sqrt(s)), c), ZERO), ONE)
+    made: np.float32 = min(max(s * s * curve(s, c), ZERO), ONE)
+    return made
+
+
+@kernel
+def below_rim(cosine: np.float32, missed: np.float32, c: Any) -> np.float32:
+    """1 − Y(cosine), given 1 − E there; c is the tuple of `Rim.curve`."""
+    share = min(max(curve(place(cosine, c), c), ZERO), ONE)
+    made: np.float32 = ONE - (ONE - missed) * share
     return made
 
 

@@ -141,9 +141,12 @@ class BlinnPhong(_Highlight):
 
 
 class Ggx(_Lobed):
-    """Ashikhmin–Shirley's matte part under GGX with separable Smith masking and Schlick's Fresnel term.
+    """A matte part under GGX with separable Smith masking, Schlick's Fresnel term and light between facets.
 
-    Parameters: base_color, metallic, specular (F0 = 0.08 · specular of what is not metal), alpha.
+    Parameters: base_color, metallic, specular (F0 = 0.08 · specular of what is not metal), alpha, and as
+    `facets` the numbers that belong to alpha: both weights of the light that bounced, the weight of the matte
+    part, and for a cosine c, with s = k / (c + k) and x = a s + b, the polynomials of what one bounce leaves
+    out, s² p(x), and of the edge's share of what it returns, q(x), each as k, a, b and coefficients.
     """
 
     def __init__(self, props: Any) -> None:
@@ -152,6 +155,9 @@ class Ggx(_Lobed):
         self.metallic = props.get_texture("metallic", 0.0)
         self.specular = props.get_texture("specular", 0.5)
         self.alpha = max(float(props.get("alpha", 0.25)), 1e-4)
+        numbers = [float(number) for number in str(props["facets"]).split()]
+        self.plain, self.coloured, self.ground = numbers[:3]
+        self.gap, self.edge = numbers[3:19], numbers[19:]
         self.facets = mi.MicrofacetDistribution(mi.MicrofacetType.GGX, self.alpha, True)
 
     def reflectance(self, si: Any, wo: Any, active: Any) -> Any:
@@ -167,9 +173,21 @@ class Ggx(_Lobed):
         slope = a2 * h.z * h.z + h.x * h.x + h.y * h.y
         density = a2 * INV_PI / (slope * slope)
         masking = _smith(wi.z, a2) * _smith(wo.z, a2)
-        matte = 28 / 23 * INV_PI * base * (1 - metallic) * (1 - dielectric)
-        matte = matte * (1 - (1 - 0.5 * wi.z) ** 5) * (1 - (1 - 0.5 * wo.z) ** 5)
-        return matte + fresnel * density * masking
+        lost_i, lost_o = self._lost(wi.z), self._lost(wo.z)
+        matte = base * (1 - metallic) * (1 - dielectric) * INV_PI * self.ground
+        matte = matte * self._below(wi.z, lost_i) * self._below(wo.z, lost_o)
+        t = dr.maximum(f0 - 0.08, 0) / 0.92
+        bounced = self.plain * f0 + self.coloured * 0.49 * t * t / (1 - 0.51 * t)
+        return matte + fresnel * density * masking + bounced * lost_i * lost_o
+
+    def _lost(self, cosine: Any) -> Any:
+        """What one bounce leaves out."""
+        s = self.gap[0] / (cosine + self.gap[0])
+        return dr.clip(s * s * _curve(s, self.gap), 0, 1)
+
+    def _below(self, cosine: Any, lost: Any) -> Any:
+        """What the edge's part of Schlick's term leaves to the matte part."""
+        return 1 - (1 - lost) * dr.clip(_curve(self.edge[0] / (cosine + self.edge[0]), self.edge), 0, 1)
 
     def lobe_sample(self, wi: Any, sample: Any) -> Any:
         """By visible facets."""
@@ -180,6 +198,15 @@ class Ggx(_Lobed):
         """Of visible facets, through the half vector."""
         h = dr.normalize(wi + wo)
         return self.facets.pdf(wi, h) / (4 * dr.maximum(dr.dot(wi, h), 1e-6))
+
+
+def _curve(s: Any, numbers: list[float]) -> Any:
+    """The polynomial of `Ggx` whose k, a, b and coefficients these are."""
+    x = dr.minimum(numbers[1] * s + numbers[2], 1)
+    made: Any = numbers[-1]
+    for coefficient in numbers[-2:2:-1]:
+        made = made * x + coefficient
+    return made
 
 
 def _mirror(w: Any) -> Any:

@@ -6,7 +6,8 @@ model          Mitsuba
 lambert        `diffuse`
 phong          `lucarne_phong` (bsdfs.py)
 blinn-phong    `lucarne_blinn_phong` (bsdfs.py)
-ggx            `roughconductor` without material where F = 1 (white metal); else `lucarne_ggx`
+ggx            `roughconductor` without material where F = 1 (white metal) and nothing bounces between
+               facets (keep_energy off); else `lucarne_ggx`
 any other      the nearest of `diffuse` and `lucarne_ggx`, with a note that tells how far it is
 =============  =====================================================================================
 
@@ -103,7 +104,7 @@ class Materials:
         if model == "lambert":
             made = put(self.root, "bsdf", "diffuse", key=key)
             self._parameter(made, "reflectance", resolved, "base_color")
-        elif model == "ggx" and _is_white_metal(resolved):
+        elif model == "ggx" and _is_white_mirror(resolved):
             made = put(self.root, "bsdf", "roughconductor", key=key)
             prop(made, "string", "material", "none")
             rgb(made, "specular_reflectance", (1, 1, 1))
@@ -114,8 +115,10 @@ class Materials:
             made = put(self.root, "bsdf", OWN[model], key=key)
             for name in param_infos(resolved.brdf.Params):
                 if model == "ggx" and name == "roughness":
-                    prop(made, "float", "alpha", _alpha(values))
-                else:
+                    numbers = resolved.brdf.shape(values)
+                    prop(made, "float", "alpha", float(numbers[0]))
+                    prop(made, "string", "facets", " ".join(repr(float(v)) for v in numbers[1:]))
+                elif name != "keep_energy":  # which the numbers of the facets say
                     self._parameter(made, name, resolved, name)
         else:
             near = nearest(material, resolved, self.registry)
@@ -212,6 +215,8 @@ def _alpha(values: Mapping[str, Value]) -> float:
     return max(roughness * roughness, LEAST_ALPHA)
 
 
-def _is_white_metal(resolved: Resolved) -> bool:
+def _is_white_mirror(resolved: Resolved) -> bool:
+    if resolved.values["keep_energy"]:
+        return False
     white = resolved.values["metallic"] == 1.0 and resolved.values["base_color"] == (1.0, 1.0, 1.0)
     return white and not {"metallic", "base_color"} & set(resolved.textures)

@@ -26,8 +26,8 @@ def test_a_metal_has_no_matte_part_and_its_own_colour() -> None:
 
 
 def test_roughness_is_squared_and_has_a_floor() -> None:
-    assert MODEL.shape({"roughness": 0.5}) == np.float32(0.25)
-    assert MODEL.shape({"roughness": 0.0}) == np.float32(1e-4)
+    assert MODEL.shape({"roughness": 0.5})[0] == np.float32(0.25)
+    assert MODEL.shape({"roughness": 0.0})[0] == np.float32(1e-4)
 
 
 @pytest.mark.parametrize("alpha", [1e-6, 1e-4, 1e-2, 0.3, 1.0])

@@ -88,6 +88,14 @@ def test_every_slot_has_its_material(host: PluginHost, parts: Any, tmp_path: Pat
         (Material(id="m", model="ggx"), "lucarne_ggx"),
         (
             Material(id="m", model="ggx", values={"metallic": 1.0, "base_color": (1.0, 1.0, 1.0)}),
+            "lucarne_ggx",
+        ),
+        (
+            Material(
+                id="m",
+                model="ggx",
+                values={"metallic": 1.0, "base_color": (1.0, 1.0, 1.0), "keep_energy": False},
+            ),
             "roughconductor",
         ),
     ],

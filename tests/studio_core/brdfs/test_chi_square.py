@@ -49,10 +49,10 @@ def test_a_wrong_density_is_found(degrees: float, monkeypatch: pytest.MonkeyPatc
     plain = module.density
     for roughness in (0.02, 0.3):
         shape = model.shape({**defaults(model.Params), "roughness": roughness})
-        assert chi_square(model, shape, wo, 1, 40_000, 3).p > 1e-3
+        assert chi_square(model, shape, wo, 2, 40_000, 3).p > 1e-3
         with monkeypatch.context() as patched:
             patched.setattr(module, "density", lambda b, s, o, i: plain(b, np.float32(s * 1.06), o, i))
-            assert chi_square(model, shape, wo, 1, 40_000, 3).p < 1e-6
+            assert chi_square(model, shape, wo, 2, 40_000, 3).p < 1e-6
 
 
 def test_a_density_of_another_lobe_is_found() -> None:

@@ -17,7 +17,10 @@ def model_of(name: str) -> Any:
 
 
 def test_shaping_parts_the_parameters() -> None:
-    assert shaping(model_of("ggx")) == (["roughness"], ["base_color", "metallic", "specular"])
+    assert shaping(model_of("ggx")) == (
+        ["roughness", "keep_energy"],
+        ["base_color", "metallic", "specular"],
+    )
     assert shaping(model_of("lambert")) == ([], ["base_color"])
     assert len(list(colour_corners(model_of("ggx")))) == 8
     assert shaped(model_of("ggx"), 0.25)["roughness"] == 0.25

@@ -38,7 +38,7 @@ def material(model, textures, values=None, name="m"):
     [
         (material("lambert", {}), CONSTANT),
         (material("lambert", {"base_color": PICTURE}), AFFINE),
-        (material("ggx", {"base_color": PICTURE}, {"metallic": 0.7}), AFFINE),
+        (material("ggx", {"base_color": PICTURE}), AFFINE),
         (material("ggx", {"specular": GREY}), AFFINE),
         (material("ggx", {"metallic": PICTURE}), AFFINE),
         (material("phong", {"diffuse": PICTURE}, {"specular": (0.0,) * 3}), AFFINE),
@@ -122,9 +122,9 @@ def test_pictures_that_are_no_longer_used_are_dropped_and_come_back_right(host):
 def test_tables_are_as_wide_as_the_material_with_most_terms(host):
     keeper = CoefficientTable(host)
     own = material("phong", {"diffuse": PICTURE}, {"diffuse": (1.0,) * 3, "specular": (0.5,) * 3}, name="a")
-    three = material("ggx", {}, {"metallic": 0.3}, name="b")
+    four = material("ggx", {}, {"metallic": 0.3}, name="b")
     two = coefficients(resolve(own, host)).reshape(-1, 6)
-    for looks, width in (((own,), 2), ((own, three), 3), ((own,), 2)):
+    for looks, width in (((own,), 2), ((own, four), 4), ((own,), 2)):
         table = table_of(host, *looks, keeper=keeper)
         assert table.width == width
         assert table.maps.tables.shape[1] == table.plain.shape[1] == 3 * width
@@ -139,3 +139,34 @@ def test_no_material_at_all(host):
     table = table_of(host)
     assert table.plain.shape == (1, 3)
     assert table.maps.kind.tolist() == [CONSTANT]
+
+
+@pytest.mark.parametrize("texture", ["base_color", "metallic"])
+def test_a_term_that_may_be_straightened_is_the_nearest_line(host, texture):
+    """Metal: three terms are lines in the texel, and what bounces is the best line that is not below 0."""
+    look = material("ggx", {texture: PICTURE}, {"metallic": 0.9, "base_color": (0.9, 0.6, 0.3)})
+    table = table_of(host, look)
+    assert table.maps.kind[0] == AFFINE
+    resolved = resolve(look, host)
+    expected = coefficients(resolved).reshape(-1, 4, 3)
+    start, count = table.maps.first[0, 0], int(np.prod(table.maps.size[0, 0]))
+    texels = table.maps.texels[start : start + count]
+    made = (table.plain[0] + table.slope[0] * np.tile(texels, 4)).reshape(-1, 4, 3)
+    np.testing.assert_allclose(made[:, :3], expected[:, :3], atol=2e-6)
+    assert made[:, 3].min() >= -1e-6
+    off = ((made[:, 3] - expected[:, 3]) ** 2).sum(axis=0)
+    for channel in range(3):
+        x, y = texels[:, channel], expected[:, 3, channel]
+        free = ((np.polyval(np.polyfit(x, y, 1), x) - y) ** 2).sum()
+        assert free * (1 - 1e-6) <= off[channel] <= 3 * free + 1e-9
+        for bent in (0.98, 1.02):  # no line near it that stays above 0 comes closer
+            low = x.min()
+            line = table.plain[0, 9 + channel] + table.slope[0, 9 + channel] * (low + bent * (x - low))
+            assert ((line - y) ** 2).sum() >= off[channel] * (1 - 1e-3)
+
+
+def test_a_picture_of_one_colour_is_not_straightened_away(host):
+    flat = Image(np.full((4, 4, 3), 0.7, np.float32))
+    look = material("ggx", {"base_color": flat}, {"metallic": 1.0, "base_color": (1.0, 1.0, 1.0)})
+    table, exact = table_of(host, look), coefficients(resolve(look, host)).reshape(-1, 12)[0]
+    np.testing.assert_allclose(table.plain[0] + table.slope[0] * 0.7, exact, atol=1e-5)

@@ -72,7 +72,7 @@ def test_textures_of_different_sizes_and_scalars_meet(host):
         },
     )
     made = coefficients(resolve(material, host))
-    assert made.shape == (4, 4, 3, 3)
+    assert made.shape == (4, 4, 4, 3)
     assert (made[:, :2, 0] > 0).all()  # left half is no metal: it has a matte part
     assert not made[:, 2:, 0].any()
 

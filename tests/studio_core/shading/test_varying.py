@@ -108,7 +108,7 @@ def test_every_vertex_has_the_roughness_of_its_place(host, seed, factor):
     assert made.data[made.offset[0]] == pytest.approx((factor * grey.mean) ** 2, rel=1e-5)
     assert len(made.address) - 1 <= min(256, len(mesh))
     assert (made.address == made.address[0]).all()
-    assert made.width == 3
+    assert made.width == 4
 
 
 def test_other_materials_and_none_keep_their_rows(host):
