@@ -226,7 +226,7 @@ def _line(resolved: Resolved, picture: Pyramid) -> tuple[F32, F32] | None:
     return plain.ravel().astype(np.float32), slope.ravel().astype(np.float32)
 
 
-def _sampled(resolved: Resolved, picture: _Pyramid, term: int) -> tuple[F64, F64]:
+def _sampled(resolved: Resolved, picture: Pyramid, term: int) -> tuple[F64, F64]:
     """Texels (K, 3) from all over the picture, and the coefficient (K, 3) of a term there."""
     rows = picture.levels[0].reshape(-1, picture.levels[0].shape[-1])[:, :3]
     texels = np.ascontiguousarray(rows[:: max(len(rows) // SAMPLED, 1)])

@@ -118,6 +118,7 @@ def ggx(values: Values, wo: Array, wi: Array) -> Array:
     linear = 0.54 - 0.81 * known.missing
     t = np.maximum(f0 - 0.08, 0) / 0.92
     survives = linear * f0 + (1 - linear) * 0.49 * t**2 / (1 - 0.51 * t)
+    survives = survives + (1 - linear) * base * (1 - metallic) * dielectric
     survives = survives * float(values.get("keep_energy", True))
     schlick = f0 + (1 - f0) * ((1 - oh) ** 5)[..., None]
     specular = lobe[..., None] * schlick + known.multiple(no, ni)[..., None] * survives

@@ -8,16 +8,16 @@ reflectance head-on, and F0 is F0d (1 − metallic) + base_color · metallic.
 F_ms f_ms is the light that bounces between facets (Kulla & Conty 2017; see `facets`). Their F_ms(F0, α) is
 replaced by B F0 + (1 − B) g(F0) with B = 0.54 − 0.81 (1 − Ē(α)), g = 0.49 t² / (1 − 0.51 t) and
 t = max(F0 − 0.08, 0) / 0.92, so that colours stay in front of terms of the roughness: white is exact, and all
-other reflectances within 0.009 of the arriving light, from any angle at any roughness.
+other reflectances within 0.01 of the arriving light, from any angle at any roughness.
 
-matte = base_color (1 − metallic)(1 − F0d) · (1 − Y(θ_i))(1 − Y(θ_o)) / (π (1 − Ȳ)), where Y is the albedo of
-DG/(4…)(1 − ω_o·h)^5: what the coat reflects is missing below it, it is reciprocal, and white returns all but
-what a dielectric's facets lose (F0d (1 − B)(1 − E): 2.4 % at roughness 1, 0.3 % at 0.5).
+matte = base_color (1 − metallic) · ((1 − F0d) (1 − Y(θ_i))(1 − Y(θ_o)) / (π (1 − Ȳ)) + F0d (1 − B) f_ms),
+where Y is the albedo of DG/(4…)(1 − ω_o·h)^5: what the coat reflects is missing below it, what its facets
+lose goes below, it is reciprocal, and white returns all.
 
-Terms: b0 the matte kernel; b1 = DG/(4…)(1 − u⁵) + B f_ms, b2 = DG/(4…) u⁵ with u = 1 − ω_o·h,
-b3 = (1 − B) f_ms; c0 = the matte colour, c1 = F0, c2 = 1 (F90), c3 = g(F0), which is 0 for all dielectrics.
-Under a single picture c3 is the line nearest to g over its texels, so that a metal's tint is as live as a
-wall's.
+Terms: b0 the first matte kernel; b1 = DG/(4…)(1 − u⁵) + B f_ms, b2 = DG/(4…) u⁵ with u = 1 − ω_o·h,
+b3 = (1 − B) f_ms; c0 = the matte colour, c1 = F0, c2 = 1 (F90), c3 = g(F0) + base_color (1 − metallic) F0d;
+g is 0 for all dielectrics. Under a single picture c3 is the line nearest to it over the texels, so that a
+metal's tint is as live as a wall's.
 
 =============  ========  =====  ============================================================
 parameter      range     unit   meaning
@@ -181,7 +181,7 @@ class Ggx(Functions):
         matte = np.float32(1 / np.pi) * base * (1 - metallic) * (1 - dielectric)
         f0 = dielectric * (1 - metallic) + base * metallic
         t = np.maximum(f0 - _MOST, 0) / (1 - _MOST)
-        bounced = (1 - _BEND) * t * t / (1 - _BEND * t)
+        bounced = (1 - _BEND) * t * t / (1 - _BEND * t) + base * (1 - metallic) * dielectric
         return np.stack(np.broadcast_arrays(matte, f0, np.ones_like(f0), bounced), axis=-2)
 
 

@@ -177,7 +177,8 @@ class Ggx(_Lobed):
         matte = base * (1 - metallic) * (1 - dielectric) * INV_PI * self.ground
         matte = matte * self._below(wi.z, lost_i) * self._below(wo.z, lost_o)
         t = dr.maximum(f0 - 0.08, 0) / 0.92
-        bounced = self.plain * f0 + self.coloured * 0.49 * t * t / (1 - 0.51 * t)
+        below = base * (1 - metallic) * dielectric
+        bounced = self.plain * f0 + self.coloured * (0.49 * t * t / (1 - 0.51 * t) + below)
         return matte + fresnel * density * masking + bounced * lost_i * lost_o
 
     def _lost(self, cosine: Any) -> Any:
