@@ -71,8 +71,8 @@ class Brdf(Protocol):
     parameter: such a name is among `values` only where the material has that picture. A model may also have
     `shape_textures: tuple[str, ...]`, numbers of the shape that may: every vertex then has a shape of its
     own. Coefficients must not depend on these unless they are among `textures` too. Where maps are made of
-    directions, `turning: str` names the parameter, in degrees, to which the pictures' rotation is added. And it
-    may have `straightened: tuple[int, ...]`, terms of little weight whose coefficients, where one picture acts,
+    directions, `turning: str` names the parameter, in degrees, to which the pictures' rotation is added.
+    `straightened: tuple[int, ...]` names terms of little weight whose coefficients, where one picture acts,
     may be replaced by the line nearest to them over its texels.
     """
 
