@@ -88,6 +88,8 @@ _SIZE = _HEAD + NODES[0] * NODES[1]
 _SHAPE = _SIZE + 2
 _TERMS = np.array([1, 2, 5])
 _LEAST_NV = np.float32(1e-4)
+_NARROW = np.float32(1 / WIDEST)
+_LAST_X, _LAST_Y = np.float32(NODES[0] - 2), np.float32(NODES[1] - 2)
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,13 +161,12 @@ class Params:
 @kernel
 def _table(s: Any, cosine_half: np.float32, cosine_light: np.float32) -> np.float32:
     """The table's tents at cos θ_h and n·l."""
-    x = np.sqrt(min(arc_cosine(min(max(cosine_half, ZERO), ONE)) / np.float32(WIDEST), ONE)) * np.float32(
-        NODES[0] - 1
-    )
+    theta = arc_cosine(min(max(cosine_half, ZERO), ONE)) * _NARROW
+    x = min(np.sqrt(theta), ONE) * np.float32(NODES[0] - 1)
     y = min(max(cosine_light, ZERO), ONE) * np.float32(NODES[1] - 1)
-    i, j = min(int(x), NODES[0] - 2), min(int(y), NODES[1] - 2)
+    i, j = np.int32(min(x, _LAST_X)), np.int32(min(y, _LAST_Y))
     u, v = x - np.float32(i), y - np.float32(j)
-    at = _HEAD + i * NODES[1] + j
+    at = _HEAD + i * np.int32(NODES[1]) + j
     low = s[at] + v * (s[at + 1] - s[at])
     high = s[at + NODES[1]] + v * (s[at + NODES[1] + 1] - s[at + NODES[1]])
     made: np.float32 = low + u * (high - low)
@@ -194,11 +195,10 @@ def evaluate(shape: Any, wo: Any, count: int, wi: Any, out: Any) -> None:
         b0[k] = lit * INV_PI * (ONE + rough * back)
     if tabled:
         for k in range(count):
-            if b0[k] > ZERO:
-                hx, hy, hz = x[k] + ox, y[k] + oy, z[k] + oz
-                length = max(np.sqrt(hx * hx + hy * hy + hz * hz), LEAST_HEIGHT)
-                more = _table(s, hz / length, z[k]) / max(z[k], FADE)
-                b0[k] = max(b0[k] + INV_PI * more, ZERO)
+            hx, hy, hz = x[k] + ox, y[k] + oy, max(z[k] + oz, LEAST_HEIGHT)
+            upright = hz / np.sqrt(hx * hx + hy * hy + hz * hz)
+            more = _table(s, upright, z[k]) / max(z[k], FADE)
+            b0[k] = max(b0[k] + INV_PI * more, ZERO) if b0[k] > ZERO else ZERO
     if terms == 1:
         return
     b1 = made[count : 2 * count]
