@@ -11,6 +11,8 @@ from oracles.solids import uses_of_edges, volume
 
 import sample_projects
 from sample_projects import make
+from sample_projects.captured_room import build as captured
+from sample_projects.captured_room import swatches
 from sample_projects.living_room import build as living
 from sample_projects.living_room import seating, window_room
 from sample_projects.modelling import equirect, mesh
@@ -24,6 +26,7 @@ from studio_core.scene.geometry import Geometry
 from studio_core.scene.nodes import Camera, Environment, MeshObject, Scene
 from studio_core.scene.shading_mesh import choose_edge, shade_mesh
 from studio_plugins.brdfs import plugin as brdfs
+from studio_plugins.residual.model import RESIDUAL
 
 FOLDER = Path(sample_projects.__file__).parent
 OPEN = {"Floor", "Paving", "Rug", "Leaves", "Print", "Grasses", "Earth"}
@@ -257,8 +260,29 @@ def test_the_stored_projects_are_what_the_scripts_make(scenes: dict[str, Scene])
 
 def test_the_stored_projects_are_small() -> None:
     files = list(FOLDER.glob("*.lucarne"))
-    assert {path.stem for path in files} == set(make.SAMPLES)
-    assert sum(path.stat().st_size for path in files) < 4e6
+    assert {path.stem for path in files} == {*make.SAMPLES, *make.FITTED}
+    assert sum(path.stat().st_size for path in files) < 8e6
+
+
+def test_the_captured_room_is_the_living_room_in_captured_materials(
+    scenes: dict[str, Scene], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Made anew from small swatches; the stored one has the same materials in the same places."""
+    for name, small in (("CLOTH_TEXELS", 32), ("CLOTH_DIRECTIONS", 9), ("STONE_TEXELS", 24), ("LAMPS", 12)):
+        monkeypatch.setattr(swatches, name, small)
+    plain, made = scenes["living-room"], captured.build()
+    kept = load(FOLDER / "captured-room.lucarne").scene
+    assert list(kept.nodes) == list(made.nodes) == list(plain.nodes)
+    other = {name for name in plain.materials if made.material(name).model != plain.material(name).model}
+    assert other == {captured.SOFA, captured.FLOOR}
+    for name in other:
+        new, stored = made.material(name), kept.material(name)
+        assert new.model == stored.model == "captured"
+        assert set(new.textures) == set(stored.textures) == {"albedo", *RESIDUAL}
+        colour = [one.textures["albedo"].image.pixels.mean(axis=(0, 1)) for one in (new, stored)]
+        np.testing.assert_allclose(*colour, rtol=0.15)
+    for thing in kept.of(MeshObject):
+        assert thing.geometry.uvs is not None or not other & set(thing.materials)
 
 
 def test_a_chair_carries_two_materials() -> None:
