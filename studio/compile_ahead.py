@@ -95,8 +95,27 @@ def work(program: Headless) -> None:
     show(moved[0], view, False)
     show(scene, dataclasses.replace(aside, antialias=1, fine_edges=False), True)
     show(scene, aside, False)
+    show(_embossed(scene), aside, False)
     ErrorMeter(services)(pipeline, first[-1], Job("measuring ahead"))
     pipeline.complete(first[-1], Job("completing ahead"))
+
+
+def _embossed(scene: Any) -> Any:
+    """The scene with a normal map on all that is drawn."""
+    import numpy as np
+
+    from studio_core.scene.geometry import Image, Texture
+    from studio_core.shading.normal_maps import NORMAL
+
+    slope = np.linspace(-0.5, 0.5, 8)
+    across, up = np.meshgrid(slope, slope)
+    texels = np.stack([0.5 + 0.5 * across, 0.5 + 0.5 * up, np.ones_like(up)], axis=2).astype(np.float32)
+    bumps = Texture(Image(texels, "data"))
+    made = [
+        dataclasses.replace(material, textures={**material.textures, NORMAL: bumps})
+        for material in scene.materials.values()
+    ]
+    return scene.with_materials(*made)
 
 
 def main() -> int:
