@@ -209,7 +209,7 @@ def test_both_backends_agree_on_tilts(host, workers):
         mean = true.terms[rows].mean(axis=0).max()
         wrong = np.sqrt(((layer.tilts - true.tilts)[rows] ** 2).mean(axis=(0, 2, 3)))
         assert (wrong < 0.05 * mean).all(), (node, wrong / mean)
-        assert np.abs(true.tilts[rows]).mean() > 0.1 * mean
+        assert np.abs(true.tilts[rows]).max() > 0.5 * mean
 
 
 def test_without_a_map_nothing_more_is_summed_kept_or_shown(host, workers):
@@ -254,7 +254,7 @@ def test_a_map_that_is_taken_away_leaves_the_picture_of_before(host, workers):
     np.testing.assert_allclose(pipeline.artifact(Picture).linear, before, rtol=1e-4, atol=1e-5)
 
 
-@pytest.mark.parametrize(("model", "least"), [("lambert", 4), ("ggx", 3)])
+@pytest.mark.parametrize(("model", "least"), [("lambert", 4), ("ggx", 2)])
 def test_pictures_with_maps_are_nearly_as_true_as_plain_ones(host, workers, model, least):
     """Against each place's own normal; without the map they are several times as far off."""
     true, bare = room(bumpy(ripples(), model)), room(bumpy(None, model))
