@@ -31,7 +31,9 @@ SIZE = (640, 360)
 WINDOW = (1440, 900)
 STEPS, REST = 32, 24  # pictures of the drag; how long the last one stays, in pictures
 PER_PICTURE = 70  # milliseconds
-WAY = ((0.0, 0.0), (1.55, 0.55))  # of the chair over the floor, metres in x and z
+Way = tuple[tuple[float, float], tuple[float, float]]
+WAY: Way = ((0.0, 0.0), (1.55, 0.55))  # of the chair over the floor, metres in x and z
+TABLE_WAY, TABLE_STEPS = ((0.0, 0.0), (0.35, 1.15)), 14
 SETTLED = 180  # seconds that a window may take to come to rest
 PHONE_AT = (0.7, 1.3, 0.6)  # where the phone is held in the sample room, metres
 FACE, PANEL = 512, (1280, 800)  # pixels of a side of the room's cube, and of the capture panel
@@ -100,7 +102,9 @@ def window(theme: str = "dark", percent: str = "100") -> None:
     studio.close()
 
 
-def frames() -> Iterator[np.ndarray]:
+def frames(
+    project: str = "living-room", thing: str = "Chair at the back", way: Way = WAY, steps: int = STEPS
+) -> Iterator[np.ndarray]:
     """8-bit pictures of a drag and of the rest after it."""
     from studio.headless import Headless
     from studio.samples import sample
@@ -116,35 +120,44 @@ def frames() -> Iterator[np.ndarray]:
     from studio_core.shading.pipeline import Pipeline
 
     program = Headless(quiet=True)
-    scene = open_scene(sample())
-    chair = next(n for n in scene.nodes.values() if n.name == "Chair at the back")
+    scene = open_scene(sample(project))
+    held = next(n for n in scene.nodes.values() if n.name == thing)
     backend = program.registry.get("backend", "cuts")
     pipeline = Pipeline([*backend.stages(program.services), PictureStage(program.services)])
     view = dataclasses.replace(scene_view(scene, None, *SIZE), antialias=2)
     params = backend.Params()
     pipeline.update(Frame(scene, view, params), everything(scene), Job("room"))
     shown = scene
-    for step in range(STEPS + 1):
-        share = 0.5 - 0.5 * np.cos(np.pi * step / STEPS)
-        x, z = (a + share * (b - a) for a, b in zip(*WAY, strict=True))
-        moved = Move({chair.id: Transform((float(x), 0.0, float(z))) @ chair.transform})(scene)
-        last = step == STEPS
+    for step in range(steps + 1):
+        share = 0.5 - 0.5 * np.cos(np.pi * step / steps)
+        x, z = (a + share * (b - a) for a, b in zip(*way, strict=True))
+        moved = Move({held.id: Transform((float(x), 0.0, float(z))) @ held.transform})(scene)
+        last = step == steps
         changes = diff(shown, moved)
         if last:
             changes |= view_changed() | view_changed(Aspect.QUALITY)
         frame = Frame(moved, view, params, step, moving=not last)
-        picture, shown = pipeline.update(frame, changes, Job("chair")), moved
+        picture, shown = pipeline.update(frame, changes, Job("drag")), moved
         yield tonemap(picture.linear, 0.0, "srgb")
 
 
 def chair() -> None:
     """A drag, and the rest after it."""
+    _filmed(frames(), "dragged-chair")
+
+
+def captured() -> None:
+    """The coffee table, dragged over captured stone in front of the captured sofa."""
+    _filmed(frames("captured-room", "Coffee table", TABLE_WAY, TABLE_STEPS), "captured-room")
+
+
+def _filmed(pictures: Iterator[np.ndarray], name: str) -> None:
     from PIL import Image
 
-    made = [Image.fromarray(pixels) for pixels in frames()]
+    made = [Image.fromarray(pixels) for pixels in pictures]
     times = [PER_PICTURE] * (len(made) - 1) + [REST * PER_PICTURE]
     made[0].save(
-        HERE / "dragged-chair.webp",
+        HERE / f"{name}.webp",
         save_all=True,
         append_images=made[1:],
         duration=times,
@@ -295,5 +308,5 @@ def shelf(application: QApplication, theme: str) -> np.ndarray:
 
 if __name__ == "__main__":
     makers = {"room": room, "windows": windows, "window": window, "chair": chair, "capture": capture}
-    makers |= {"library": library}
+    makers |= {"library": library, "captured": captured}
     makers[sys.argv[1]](*sys.argv[2:])
