@@ -27,7 +27,7 @@ def test_rows_of_models(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> N
     assert written["details"]["phong"]["chi2_tests"] == 20
     table = capsys.readouterr().out
     assert "| lambert | 0 | 1.000 |" in table
-    assert "| phong | 0.75 | 1.000 |" in table
+    assert "| phong | 0.3 | 1.000 |" in table
 
 
 def test_rows_of_exchange(tmp_path: Path) -> None:
