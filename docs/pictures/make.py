@@ -3,7 +3,8 @@
 `room` renders the sample room, `windows` photographs the window when it has come to rest (both themes, 100
 and 150 %; `window THEME PERCENT` makes one of them), `chair` drags a chair through the settled room as a hand
 does and lets it rest, exact and refined. `capture` has the simulated phone photograph the sample room and the
-capture panel make its light of that. `library` shows the library of materials in both themes.
+capture panel make its light of that. `library` shows the library of materials in both themes. `fit` has a
+ball of the lab photographed and shows the report of the material that is made of it.
 """
 
 from __future__ import annotations
@@ -306,7 +307,47 @@ def shelf(application: QApplication, theme: str) -> np.ndarray:
     return rows[:, : 3 * shown.width()].reshape(shown.height(), shown.width(), 3).copy()
 
 
+def fit() -> None:
+    """The report of a material from photographs: a glossy one with spots that are not."""
+    os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
+    os.environ["LUCARNE_STATE"] = tempfile.mkdtemp(prefix="lucarne-pictures-")
+    from PySide6.QtWidgets import QApplication
+
+    from studio.app import assemble
+    from studio.bench.lab import dome, shoot
+    from studio.bench.lab_files import write_shots
+    from studio.bench.lab_surfaces import library
+    from studio.bench.materials_captured import REAL
+    from studio_ui.settings import Settings, state_folder
+
+    folder = Path(tempfile.mkdtemp(prefix="lucarne-shots-")) / "Lacquered cork"
+    folder.mkdir()
+    write_shots(shoot(library()["two-component"], dome((-40.0, 0.0, 40.0)), REAL), folder)
+    application = QApplication(sys.argv[:1])
+    studio = assemble(settings=Settings(state_folder()))
+    studio.window.show()
+    dialog = studio.window.fitting.show(folder)
+    dialog.order.size_.setCurrentText("128 × 128")
+    dialog.fit()
+    page = dialog.report
+
+    def ready() -> bool:
+        return (
+            page.fitted is not None and page.ball.image is not None and page.pictures.view.shown is not None
+        )
+
+    rest = time.monotonic() + 5 * SETTLED
+    while not ready():
+        if time.monotonic() > rest:
+            raise SystemExit("nothing was fitted")
+        application.processEvents()
+        time.sleep(0.01)
+    if not dialog.grab().save(str(HERE / "fit.webp"), "webp", 88):
+        raise SystemExit("the picture cannot be written")
+    studio.close()
+
+
 if __name__ == "__main__":
     makers = {"room": room, "windows": windows, "window": window, "chair": chair, "capture": capture}
-    makers |= {"library": library, "captured": captured}
+    makers |= {"library": library, "captured": captured, "fit": fit}
     makers[sys.argv[1]](*sys.argv[2:])

@@ -168,6 +168,16 @@ def test_the_error_map(window: Driver, report: FitDialog) -> None:
     bright, dark, nothing = shown.pixels[4, 5].sum(), shown.pixels[0, 1].sum(), shown.pixels[0, 0]
     assert bright > dark
     assert tuple(nothing) == tuple(heat(np.full((1, 1), np.nan, np.float32))[0, 0])
+    pictures.view.hovered.emit((5.5, 4.5))
+    pattern = Pattern(FITTER.requests[0])
+    seen = pattern.photograph(pictures.lamp)
+    usual = np.sqrt((seen[pattern.trusted(pictures.lamp)].astype(float) ** 2).sum(axis=-1).mean())
+    off = (1 - DARKER) * float(np.linalg.norm(seen[4, 5])) / usual
+    assert pictures.told.text() == f"Here it is off by {percent(off)}"
+    pictures.view.hovered.emit((0.5, 0.5))
+    assert "nothing counts" in pictures.told.text()
+    pictures.view.hovered.emit(None)
+    assert "held back" in pictures.told.text()
     pictures.show_lamp(0)
     quiet(window, report)
     assert pictures.mode == DIFFERENCE

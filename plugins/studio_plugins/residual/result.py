@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -77,14 +78,18 @@ class ResidualFit:
         """Of the residual, as half floats."""
         return self.basis.bytes_per_texel
 
+    @cached_property
+    def frames(self) -> F32:
+        """(h, w, 3, 3) tangent frames of the texels."""
+        return tangent_frames(self.normals)
+
     def predict(self, lights: Lights) -> F32:
         """(n, h, w, 3) light that comes back, as under strength 1; ≥ 0."""
-        frames = tangent_frames(self.normals)
 
         def whole(now: Shade) -> F32:
             if not self.basis.size:
                 return now.shared
-            columns = now.columns(self.basis.name, frames)
+            columns = now.columns(self.basis.name, self.frames)
             added = np.einsum("hwk,hwkc->hwc", columns, self.coefficients)
             return np.asarray(now.shared + added, np.float32)
 

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Protocol
 
-from PySide6.QtCore import Qt, QTimer
+from PySide6.QtCore import QPoint, QSize, Qt, QTimer
 from PySide6.QtGui import QCloseEvent
 from PySide6.QtWidgets import (
     QDialog,
@@ -156,7 +156,7 @@ class FitDialog(QDialog):
         self.tell("")
         if not self._reported:  # later the size is the person's own
             self._reported = True
-            self.resize(max(self.width(), _REPORT[0]), max(self.height(), _REPORT[1]))
+            self._grow()
         self.pages.setCurrentIndex(1)
         self.report.show_fit(fitted)
         self._state()
@@ -219,6 +219,18 @@ class FitDialog(QDialog):
         if self.report.fitted is not None and kept is not None:
             self._fitting.save_report(self.report.fitted, kept.name)
 
+    def _grow(self) -> None:
+        """Room for the report, in the middle of the window and within the screen."""
+        room = self.screen().availableGeometry()
+        size = self.size().expandedTo(QSize(*_REPORT)).boundedTo(room.size())
+        self.resize(size)
+        around = self.parentWidget()
+        middle = around.frameGeometry().center() if around is not None else room.center()
+        corner = middle - QPoint(size.width() // 2, size.height() // 2)
+        most = room.bottomRight() - QPoint(size.width() - 1, size.height() - 1)
+        x, y = max(min(corner.x(), most.x()), room.left()), max(min(corner.y(), most.y()), room.top())
+        self.move(x, y)
+
     def _over(self) -> None:
         self._timer.stop()
         self.task = None
@@ -249,7 +261,7 @@ class FitDialog(QDialog):
         self.bar.setRange(0, 1000)
         self.bar.setValue(round(1000 * share))
         taken = time.monotonic() - job.started
-        left = f", about {duration(taken / share - taken)} left" if share > 0.2 and taken > 5 else ""
+        left = f", about {duration(taken / share - taken)} left" if share > 0.3 and taken > 5 else ""
         self.tell(f"{job.label}: {100 * share:.0f} %{left}")
 
 

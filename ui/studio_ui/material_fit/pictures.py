@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 
 import numpy as np
@@ -29,7 +30,7 @@ from studio_ui.look.theme import GAP, Theme
 from studio_ui.material_fit.heat import HeatLegend, heat
 from studio_ui.material_fit.lamp_tool import FURTHEST, LampTool
 from studio_ui.material_fit.newest import Newest
-from studio_ui.material_fit.words import lamp_place, lamp_told
+from studio_ui.material_fit.words import lamp_place, lamp_told, percent
 from studio_ui.panels.panel import note, row
 
 COMPARE, DIFFERENCE, RELIGHT = "compare", "difference", "relight"
@@ -98,6 +99,8 @@ class FitPictures(QWidget):
         column.addWidget(self.view, 1)
         column.addWidget(self.below)
         column.addWidget(self.told)
+        self._error: F32 | None = None
+        self.view.hovered.connect(self._read)
         self.show_mode(COMPARE)
 
     def set_theme(self, theme: Theme) -> None:
@@ -140,11 +143,11 @@ class FitPictures(QWidget):
             return
         fitted, lamp = self.fitted, self.lamp
 
-        def work() -> tuple[F32, F32, npt.NDArray[np.uint8]]:
+        def work() -> tuple[F32, F32, F32]:
             seen, made = fitted.photograph(lamp), fitted.reconstruction(lamp)
-            return seen, made, heat(relative_error(made, seen, fitted.trusted(lamp)))
+            return seen, made, relative_error(made, seen, fitted.trusted(lamp))
 
-        def done(found: tuple[F32, F32, npt.NDArray[np.uint8]]) -> None:
+        def done(found: tuple[F32, F32, F32]) -> None:
             if (self.lamp, self.fitted) == (lamp, fitted) and self.mode != RELIGHT:
                 self._show(*found)
 
@@ -165,9 +168,10 @@ class FitPictures(QWidget):
 
         self.asked.ask(lambda: fitted.relit(azimuth, height), done)
 
-    def _show(self, seen: F32, made: F32, colours: npt.NDArray[np.uint8]) -> None:
+    def _show(self, seen: F32, made: F32, error: F32) -> None:
+        self._error = error
         if self.mode == DIFFERENCE:
-            self._put(Shown("map", "Difference", colours))
+            self._put(Shown("map", "Difference", heat(error)))
         else:
             self._put(Shown("map", "Reconstruction", made, before=seen))
 
@@ -185,6 +189,17 @@ class FitPictures(QWidget):
             text = lamp_told(self.fitted.lamps[self.lamp])
         self.told.setText(text)
         self.view.setAccessibleDescription(text)
+
+    def _read(self, point: tuple[float, float] | None) -> None:
+        """How wrong it is under the mouse."""
+        if self.mode != DIFFERENCE or self._error is None or self.view.shown is None:
+            return
+        if point is None or self._error.shape != self.view.shown.pixels.shape[:2]:
+            self._tell()
+            return
+        here = float(self._error[int(point[1]), int(point[0])])
+        nothing = "Here nothing counts: not lit, clipped, or beside the sample"
+        self.told.setText(nothing if math.isnan(here) else f"Here it is off by {percent(here)}")
 
     def _show_place(self) -> None:
         self.azimuth.show_value(self.tool.place[0])
