@@ -30,7 +30,7 @@ from studio_core.shading.artifacts import (
 from studio_core.shading.brute_force import all_points, lamp_layer
 from studio_core.shading.frame import Frame
 from studio_core.shading.job import Job
-from studio_core.shading.normal_maps import normal_texture
+from studio_core.shading.normal_maps import NORMAL, normal_texture
 from studio_core.shading.pipeline import Inputs
 from studio_core.shading.surface_points import mapped_points, some_hits, surface_points, surface_uvs
 from studio_core.shading.varying import ShapeTable
@@ -112,7 +112,8 @@ class PixelLampsMaker:
         }
         if not lamps:
             return made
-        reliefs = (normal_texture(frame.scene.material(name)) for name in surfaces.materials)
+        looks = [frame.scene.material(name) for name in surfaces.materials]
+        reliefs = [part for look in looks for part in (normal_texture(look), look.values.get(NORMAL))]
         key = (surfaces, casters, inputs[Shapes], made.hits, *lamps.values(), *reliefs)
         if self._made is None or not _same(self._made[0], key):
             scene, table, materials = frame.scene, self._table, surfaces.materials
