@@ -53,7 +53,7 @@ def test_every_decision_is_in_the_index() -> None:
     numbered = sorted(path.name for path in folder.glob("[0-9]*.md"))
     assert numbered
     assert [name for name in numbered if f"({name})" not in index] == []
-    assert len({name[:4] for name in numbered}) == len(numbered)
+    assert [name[:4] for name in numbered] == [f"{i:04}" for i in range(1, len(numbered) + 1)]
 
 
 def test_every_dependency_has_its_reason() -> None:
