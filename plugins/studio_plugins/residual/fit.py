@@ -47,8 +47,8 @@ def fit(samples: Samples, settings: Settings | None = None, job: Job | None = No
     def step() -> None:
         job.checkpoint(next(done), total)
 
-    model = best_parametric(samples, settings.models, use=use, step=step)
-    lights = samples.lights
+    model = first = best_parametric(samples, settings.models, use=use, step=step)
+    lights, as_told, trusted = samples.lights, samples, use
     for turn in range(settings.refine):
         mended = None
         if settings.table:
@@ -62,6 +62,13 @@ def fit(samples: Samples, settings: Settings | None = None, job: Job | None = No
         model = best_parametric(samples, models, use=use, step=step)
     texels = _Texels.of(samples, _spread(samples, use), settings)
     shared, basis, tried = _chosen(texels, model, settings)
+    refused = False
+    if settings.refine and settings.cautious and tried:
+        plain = _Texels.of(as_told, _spread(as_told, trusted), settings)
+        other = _chosen(plain, first, settings)
+        if _least(other[2]) < _least(tried):
+            samples, model, texels, refused = as_told, first, plain, True
+            shared, basis, tried = other
     if settings.table and shared.table is not None:
         shared = Shared(model, texels.table(model, np.ones(len(samples.lights), np.bool_)))
     step()
@@ -76,7 +83,7 @@ def fit(samples: Samples, settings: Settings | None = None, job: Job | None = No
         samples.views,
         samples.lights,
         tried,
-        _notes(model, lights.directions, samples, rank, basis),
+        _notes(model, lights.directions, samples, rank, basis, refused),
     )
 
 
@@ -96,8 +103,14 @@ def _trusted(samples: Samples, settings: Settings) -> Flags:
     return use & samples.usable if settings.masks.clipped else use
 
 
-def _notes(model: Parametric, told: object, samples: Samples, rank: object, basis: Basis) -> tuple[str, ...]:
+def _notes(
+    model: Parametric, told: object, samples: Samples, rank: object, basis: Basis, refused: bool
+) -> tuple[str, ...]:
     made = []
+    if refused:
+        made.append(
+            "light directions stay as told: refined ones predict lights that were held back no better"
+        )
     if model.at_bound:
         made.append("a shape of the reflectance model is at the end of its range")
     off = np.degrees(np.arccos(np.clip((np.asarray(told) * samples.lights.directions).sum(axis=1), -1, 1)))
@@ -284,6 +297,10 @@ def _direction(model: Parametric) -> F32:
     colour = model.colours[model.matte_terms :].sum(axis=0)
     luminance = float(colour @ np.array(LUMINANCE))
     return np.asarray(colour / luminance if luminance > 0 else np.ones(3), np.float32)
+
+
+def _least(tried: tuple[Candidate, ...]) -> float:
+    return min(map(_score, tried))
 
 
 def _score(one: Candidate) -> float:

@@ -95,11 +95,15 @@ def _held(name: str, lights: Lights) -> Flags:
 
 
 def _as_measured(made: ResidualFit, samples: Samples, held: Flags, refine: bool) -> Samples:
-    """All lamps as the fit knows them: its own refined by it, those held back by the finished material."""
+    """All lamps as the fit knows them: its own refined by it, those held back by the finished material.
+
+    Where it left its own as told, these stay as told, too.
+    """
     towards, strengths = samples.lights.directions.copy(), samples.lights.strengths.copy()
     known = made.lights
+    moved = not np.array_equal(towards[~held], known.directions)
     towards[~held], strengths[~held] = known.directions, known.strengths
-    if held.any() and refine:
+    if held.any() and refine and moved:
         other = relit(made, samples.some(held)).lights
         towards[held], strengths[held] = other.directions, other.strengths
     return samples.lit_by(replace(samples.lights, directions=towards, strengths=strengths))

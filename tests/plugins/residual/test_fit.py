@@ -86,6 +86,24 @@ def test_lights_that_are_told_wrongly_are_found() -> None:
     assert refined < 0.3 * as_told
 
 
+def test_refined_lights_that_predict_worse_are_left_where_they_were_told(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    samples, _ = photographed(library()["textured"])
+    turn = np.array([[0.98, 0.0, 0.199], [0.0, 1.0, 0.0], [-0.199, 0.0, 0.98]])
+
+    def astray(some: Samples, *others: object) -> Lights:
+        return replace(some.lights, directions=some.lights.directions @ turn)
+
+    monkeypatch.setattr("studio_plugins.residual.fit.refined", astray)
+    quick = Settings(models=("lambert",), basis="albedo", table=False, refine=1)
+    found = fit(samples, quick)
+    assert np.array_equal(found.lights.directions, samples.lights.directions)
+    assert any("stay as told" in note for note in found.notes)
+    careless = fit(samples, replace(quick, cautious=False))
+    assert not np.allclose(careless.lights.directions, samples.lights.directions, atol=0.1)
+
+
 def test_nothing_is_worse_than_the_model_alone_when_nothing_is_to_be_learned() -> None:
     rng = np.random.default_rng(4)
     samples, _ = photographed(Surface((0.5, 0.4, 0.3)), row())
