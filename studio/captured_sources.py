@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,7 +13,7 @@ if TYPE_CHECKING:
     from studio.headless import Headless
     from studio_plugins.residual.pictures import Pictures
     from studio_plugins.residual.result import ResidualFit, Settings
-    from studio_plugins.residual.samples import Ball, Flags, Samples
+    from studio_plugins.residual.samples import Ball, Samples
 
 
 _OF_PHOTOGRAPHS = (
@@ -116,6 +115,7 @@ def _photographs(options: argparse.Namespace, program: Headless) -> Source:
     from studio_plugins.residual.flat import flat_samples
     from studio_plugins.residual.lights import from_mirror_ball, read_list
     from studio_plugins.residual.pictures import read_folder, read_mask
+    from studio_plugins.residual.reading import on_ball
     from studio_plugins.residual.samples import Lights
 
     least = 0.1 if options.flat else 1.01
@@ -146,40 +146,11 @@ def _photographs(options: argparse.Namespace, program: Headless) -> Source:
     if options.flat:
         return Source(flat_samples(pictures, options.size, mask, distance), found, pictures.notes)
     given = _numbers("--ball", options.ball)
-    return _on_ball(pictures, mask, given, distance, options, found)
-
-
-def _on_ball(
-    pictures: Pictures,
-    mask: Flags | None,
-    given: tuple[float, float, float] | None,
-    distance: float,
-    options: argparse.Namespace,
-    found: dict[str, Any],
-) -> Source:
-    from studio_plugins.residual.ball import find_ball
-    from studio_plugins.residual.light_check import checked
-    from studio_plugins.residual.reflectance_map import reflectance_maps
-
-    factor = pictures.factor
-    if given is not None:
-        ball, spread = _ball(given, factor, distance), 0.0
-    else:
-        seen = find_ball(pictures.light, distance, mask)
-        ball, spread = seen.ball, seen.spread
-    lights, notes = pictures.lights, pictures.notes
-    if not options.no_refine:
-        told = checked(pictures.light, pictures.clipped, ball, lights)
-        ball, lights, notes = told.ball, told.lights, (*notes, *told.notes)
+    ball = _ball(given, factor, distance) if given is not None else None
+    check = not options.no_refine
+    samples, found["ball"], notes = on_ball(pictures, ball, mask, distance, options.size, check)
+    if check:
         found["notes"] = list(notes)
-    samples = reflectance_maps(pictures.light, pictures.clipped, ball, lights, options.size)
-    found["ball"] = {
-        "x": ball.x * factor,
-        "y": ball.y * factor,
-        "radius": ball.radius * factor,
-        "spread": spread * factor,
-        "distance": ball.distance if math.isfinite(ball.distance) else None,
-    }
     return Source(samples, found, notes)
 
 
