@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from captured_fits import made_up
 from gl_support import Painter, agreement, edges, require_offscreen, sized
 from hypothesis import given
 from hypothesis import strategies as st
@@ -27,6 +28,7 @@ from studio_core.scene.shading_mesh import BUDGET, NO_BACK, ShadingMesh, refine
 from studio_core.scene.transform import Transform, looking
 from studio_core.session import View
 from studio_core.shading.artifacts import Picture
+from studio_plugins.residual.material import scene_material
 from studio_ui.canvas.grid import grid_strength
 from studio_ui.canvas.raster_viewport import outline
 from studio_ui.canvas.viewport import GRID
@@ -111,6 +113,18 @@ METAL = {
     "model": "ggx",
     "textures": frozen_map({"base_color": Texture(PICTURE), "metallic": Texture(GREY)}),
 }
+SWATCH = scene_material(made_up("blinn", "albedo-half", size=17)).material
+DEEP = {  # with pixels whose sum is below nothing
+    "model": SWATCH.model,
+    "values": SWATCH.values,
+    "tables": SWATCH.tables,
+    "textures": frozen_map(
+        {
+            name: Texture(Image(one.image.pixels * (40 if name.startswith("residual") else 1)), (3.0, 2.0))
+            for name, one in SWATCH.textures.items()
+        }
+    ),
+}
 BUMPS = Texture(Image(RNG.integers(60, 256, (23, 31, 3), dtype=np.uint8), "data"), (2.0, 3.0), (0.3, 0.1))
 SCENES = {
     "normal map": scene_of(**ROUGH, textures=frozen_map({"normal": BUMPS})),
@@ -127,6 +141,10 @@ SCENES = {
     ),
     "glass with a normal map": scene_of(
         *sheets(3), **ROUGH, opacity=0.6, textures=frozen_map({"normal": BUMPS})
+    ),
+    "captured": scene_of(**DEEP),
+    "captured with a normal map": scene_of(
+        **{**DEEP, "textures": frozen_map({**DEEP["textures"], "normal": BUMPS})}
     ),
     "plain": scene_of(**ROUGH),
     "picture": scene_of(**COLOURED),
