@@ -227,7 +227,10 @@ def _warm(context: Context, compute: Executor, files: Executor, bridge: Bridge) 
 
 def _samples() -> dict[str, Path]:
     with contextlib.suppress(LucarneError, OSError):
-        found = sorted(samples.sample_folder().glob("*.lucarne"))
+        found = sorted(
+            samples.sample_folder().glob("*.lucarne"),
+            key=lambda path: (path.stem != samples.DEFAULT, path.stem),
+        )
         return {path.stem.replace("-", " ").capitalize(): path for path in found}
     return {}
 

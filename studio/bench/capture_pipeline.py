@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from studio.bench.harness import Report
+from studio.bench.harness import Report, peak_bytes
 from studio.bench.phone import Arc, Phone, shoot
 from studio.bench.phone_files import write_shots
 from studio.bench.phone_response import Curve
@@ -85,7 +85,7 @@ def child() -> None:
     status = main(sys.argv[1:])
     seconds = time.perf_counter() - started
     mine, others = (resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
-    own, other = mine.ru_maxrss * 1024, others.ru_maxrss * 1024
+    own, other = peak_bytes(), others.ru_maxrss * 1024
     cpu = sum(used.ru_utime + used.ru_stime for used in (mine, others))
     told = {"status": status, "seconds": seconds, "cpu_seconds": cpu}
     told |= {"own_peak_bytes": own, "peak_bytes": own + other}

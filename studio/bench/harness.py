@@ -172,6 +172,18 @@ class PowerLaw:
         return float((y / self.scale) ** (1 / self.exponent))
 
 
+def peak_bytes() -> int:
+    """Most memory that this process had. `getrusage` begins with what its parent had when it was started."""
+    status = Path("/proc/self/status")
+    if status.is_file():
+        for line in status.read_text().splitlines():
+            if line.startswith("VmHWM:"):
+                return int(line.split()[1]) * 1024
+    import resource
+
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
+
+
 def commit() -> str:
     """The checkout's commit, marked when there are changes; empty outside one."""
     here = Path(__file__).resolve().parent

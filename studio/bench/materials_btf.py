@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from studio.bench.capture_pipeline import in_child
-from studio.bench.harness import Report
+from studio.bench.harness import Report, peak_bytes
 from studio.bench.lab_btf import ClothBtf, Weave
 from studio.bench.lab_btf_files import write_pictures
 from studio_core.errors import LucarneError
@@ -89,7 +89,6 @@ def _in_child(texels: int, parallax: bool) -> dict[str, Any]:
 
 def child() -> None:
     """One fit; the last line tells what it took and how well it foretells what was kept back."""
-    import resource
 
     import numpy as np
 
@@ -105,7 +104,7 @@ def child() -> None:
         "seconds": time.perf_counter() - started,
         "cpu_seconds": time.process_time() - used,
         "making": btf.making,
-        "peak_bytes": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024,
+        "peak_bytes": peak_bytes(),
         "holdout_nmse": errors.made.whole,
         "holdout_nmse_outside": errors.made.outside,
         "parametric_nmse": errors.alone.whole,

@@ -54,6 +54,9 @@ TESTS = Path(__file__).resolve().parents[2] / "tests"
 def run(report: Report, program: Headless) -> None:
     """Rows MODEL for every registered model."""
     registry = program.registry
+    wanted = [name for name in registry.names("brdf") if report.wants(name)]
+    if not wanted:
+        return
     oracles = _oracles()
     if not oracles:
         report.notes.append("furnace_error needs the float64 models of a checkout's tests: left out.")
@@ -64,9 +67,7 @@ def run(report: Report, program: Headless) -> None:
         "| model | shape | " + " | ".join(f"{angle}°" for angle in SHOWN_AT) + " |",
         "|---|---|" + "---:|" * len(SHOWN_AT),
     ]
-    for name in registry.names("brdf"):
-        if not report.wants(name):
-            continue
+    for name in wanted:
         brdf = registry.brdf(name)
         with program.job(name):
             _energy(report, name, brdf, oracles.get(brdf.id))

@@ -127,7 +127,7 @@ def test_drawn_directions_are_worth_drawing(model: Any) -> None:
         value = evaluate(model, shape, wo, wi)[:, term] * wi[:, 2]
         weight = np.divide(value, drawn, out=np.zeros_like(drawn), where=drawn > 0)
         off = 5 * weight.std() / np.sqrt(len(weight)) + 2e-3 * truth[term]
-        assert abs(weight.mean() - truth[term]) < off, term
+        assert abs(weight.mean() - truth[term]) <= off, term
 
 
 @pytest.mark.parametrize("name", DENSITIES)

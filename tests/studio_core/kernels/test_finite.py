@@ -129,8 +129,8 @@ def test_samples_of_any_triangle(corners, uvs, level, distance, density, kind):
     shown, height, texels = np.empty((1, 3), np.uint32), np.empty(1, np.float32), np.empty(1, np.float32)
     shown_sides(0, 1, place, faces, faces, np.array([1.0, 2.0, 3.0]), shown, height)
     first, size = np.array([[0, 4, 0, 0]]), np.array([[[2, 2], [1, 1], [0, 0], [0, 0]]])
-    scale = np.array([[1, 1, 0, 0]], np.float32)
-    face_texels(0, 1, place, np.array(uvs, np.float32), faces, material, kinds, size, scale, texels)
+    laid = np.array([[1, 0, 0, 0, 1, 0]], np.float32)
+    face_texels(0, 1, place, np.array(uvs, np.float32), faces, material, kinds, size, laid, texels)
     assert np.isfinite(texels).all()
     record = np.zeros((3, RECORD), np.float32)
     record[:, :6], record[:, 6:] = level, uvs
@@ -138,7 +138,7 @@ def test_samples_of_any_triangle(corners, uvs, level, distance, density, kind):
     hit = (np.zeros(1, np.int32), *np.array([[0.2], [0.3]], np.float32), np.array([distance], np.float32))
     for met in (texels, np.array([density], np.float32)):
         given_faces = (shown, height, met, material)
-        maps = (kinds, record, sums, PIXELS[:5, :3].copy(), PIXELS[:5], first, size, np.array([2]), scale)
+        maps = (kinds, record, sums, PIXELS[:5, :3].copy(), PIXELS[:5], first, size, np.array([2]), laid)
         shade_hits(0, 1, *hit, *given_faces, *maps, 0.01, PIXELS[:0, :3], PIXELS[:0, :3], out)
         assert np.isfinite(out).all()
         assert (out >= 0).all()
