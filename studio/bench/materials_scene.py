@@ -22,13 +22,12 @@ from studio.bench.materials_normals import costs, floor_scene
 from studio.headless import Headless
 from studio_core.arrays import frozen_map
 from studio_core.contract import Services
-from studio_core.kernels.directions import direction_set
 from studio_core.params import defaults
 from studio_core.scene.diff import everything
 from studio_core.scene.geometry import Image
 from studio_core.scene.nodes import Environment, Material, PointLamp, Scene
-from studio_core.shading.artifacts import Casters, Lighting, Radiance
-from studio_core.shading.brute_force import VisibilityBits
+from studio_core.shading.artifacts import Casters, Lighting, Radiance, ShadingPoints
+from studio_core.shading.brute_force import VisibilityBits, beams
 from studio_core.shading.frame import Frame
 from studio_core.shading.job import Job
 from studio_core.shading.offline import backend_params, scene_view
@@ -39,6 +38,7 @@ from studio_plugins.residual.model import MODEL, RESIDUAL
 from studio_plugins.residual.result import ResidualFit
 from studio_plugins.residual.shading import shade
 
+F32 = npt.NDArray[np.float32]
 F64 = npt.NDArray[np.float64]
 
 LEVEL = 15
@@ -80,16 +80,12 @@ def fusion(services: Services, found: ResidualFit, sky: Image, backend: str, pla
     casters = pipeline.artifact(Casters)
     assert radiance is not None
     assert lighting is not None
-    assert lighting.tree is not None
     assert casters is not None
     mesh, (layer,) = radiance.surfaces.mesh, radiance.layers.values()
     rng = np.random.default_rng(3)
     valid = np.flatnonzero(radiance.valid)
     some = rng.choice(valid, min(places, len(valid)), replace=False)
-    directions = direction_set(LEVEL)
-    bits = VisibilityBits(mesh, casters.shadow, services.workers).of(some, directions, "all", Job("seeing"))
-    seen = np.unpackbits(bits.view(np.uint8), axis=1, bitorder="little").astype(np.float32)
-    leaves = np.asarray(lighting.tree.coarsened(LEVEL).radiance, np.float32) * directions.solid_angle
+    arriving = _arriving(services, lighting, casters, mesh, some)
     eye = np.asarray(frame.view.transform.translation) - mesh.origin
     texels = rng.integers(0, found.normals.shape[0] * found.normals.shape[1], len(some))
     made, truth = np.empty((2, len(some), 3))
@@ -97,10 +93,25 @@ def fusion(services: Services, found: ResidualFit, sky: Image, backend: str, pla
         normal, tangent = mesh.normals[p].astype(np.float64), mesh.tangents[p].astype(np.float64)
         axes = np.stack([tangent[:3], tangent[3] * np.cross(normal, tangent[:3]), normal])
         view = axes @ (eye - mesh.positions[p])
-        light = leaves * seen[row][:, None]
-        truth[row] = integral(found, int(texel), view, directions.directions @ axes.T, light)
+        truth[row] = sum(
+            integral(found, int(texel), view, directions @ axes.T, light * seen[row][:, None])
+            for directions, light, seen in arriving
+        )
         made[row] = (layer.terms[p] * of_texel(found, material, int(texel))).sum(axis=0)
     return float(np.abs(made - truth).mean() / np.abs(truth).mean())
+
+
+def _arriving(
+    services: Services, lighting: Lighting, casters: Casters, mesh: ShadingPoints, some: npt.NDArray[np.int64]
+) -> list[tuple[F32, F32, F32]]:
+    """Directions (S, 3), light (S, 3) with Δω, and what of it reaches some points (P, S): leaves and suns."""
+    bits, made = VisibilityBits(mesh, casters.shadow, services.workers), []
+    for beam in beams(lighting, LEVEL, quarters=False):
+        words = bits.of(some, beam.directions, beam.name, Job("seeing"))
+        seen = np.unpackbits(words.view(np.uint8), axis=1, bitorder="little").astype(np.float32)
+        light = (beam.light * beam.directions.solid_angle).astype(np.float32)
+        made.append((beam.directions.directions, light, seen))
+    return made
 
 
 def integral(found: ResidualFit, texel: int, view: F64, wi: F64, light: npt.NDArray[np.float32]) -> F64:
