@@ -60,15 +60,18 @@ class Bound:
 
     def coefficients(self, values: Mapping[str, npt.NDArray[np.floating[Any]]]) -> npt.NDArray[np.float32]:
         """Of the model, as many as it has terms with these tables."""
-        made = self.inner.coefficients(values)
-        if made.shape[-2] == self.terms:
-            return made
-        own = np.zeros((*made.shape[:-2], self.terms, 3), np.float32)
-        shared = min(self.terms, made.shape[-2])
-        own[..., :shared, :] = made[..., :shared, :]
-        return own
+        return padded(self.inner.coefficients(values), self.terms)[..., : self.terms, :]
 
 
 def bound(model: TabulatedBrdf, tables: Mapping[str, Table]) -> Bound:
     """The model with what it reads of `tables`; KeyError when one is missing."""
     return Bound(model, {name: tables[name] for name in model.tables})
+
+
+def padded(made: npt.NDArray[np.float32], width: int) -> npt.NDArray[np.float32]:
+    """Coefficients (…, K, 3) with at least `width` terms, zeros behind their own."""
+    if made.shape[-2] >= width:
+        return made
+    wider = np.zeros((*made.shape[:-2], width, 3), np.float32)
+    wider[..., : made.shape[-2], :] = made
+    return wider

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Callable
 from typing import Generic, TypeVar
 
@@ -17,7 +18,8 @@ class Kept(Generic[T]):
 
     def __call__(self, make: Callable[[], T], *key: object) -> T:
         """The value made from `key`; `make` is called where one of it is another object than last time."""
-        same = self._key is not None and all(a is b for a, b in zip(self._key, key, strict=True))
+        known = self._key
+        same = known is not None and len(known) == len(key) and all(map(operator.is_, known, key))
         if not same or self._value is None:
             self._key = self._value = None  # if making fails, nothing is kept
             self._value = make()

@@ -10,7 +10,7 @@ from typing import Any, cast
 import numpy as np
 import numpy.typing as npt
 
-from studio_core.brdfs.bound import Bound, bound
+from studio_core.brdfs.bound import Bound, bound, padded
 from studio_core.contract import Brdf, Registry, TabulatedBrdf
 from studio_core.errors import InputError, LucarneError, PluginError
 from studio_core.params import Value, check, defaults, param_infos
@@ -85,7 +85,8 @@ def resolve(material: Material, registry: Registry) -> Resolved:
             values[name] = _times(values[name], mean)
             problem = f"{material.name}: the textures of one material lie alike; {name} is shown as its mean"
     turning = getattr(brdf, "turning", "")
-    for texture in (*textures.values(),)[:1] if turning else ():
+    if turning and textures:
+        texture = next(iter(textures.values()))
         values[turning] = math.remainder(_number(values[turning]) + texture.rotation, 360.0)
     if not getattr(brdf, "tables", ()):
         return Resolved(brdf, values, textures, problem, (), shaping)
@@ -213,15 +214,6 @@ def coefficients(resolved: Resolved, width: int = 0) -> npt.NDArray[np.float32]:
     return padded(np.asarray(resolved.brdf.coefficients(values), np.float32), width)
 
 
-def padded(made: npt.NDArray[np.float32], width: int) -> npt.NDArray[np.float32]:
-    """Coefficients (…, K, 3) with at least `width` terms, zeros behind their own."""
-    if made.shape[-2] >= width:
-        return made
-    wider = np.zeros((*made.shape[:-2], width, 3), np.float32)
-    wider[..., : made.shape[-2], :] = made
-    return wider
-
-
 def _numeric(value: Value) -> bool:
     return not isinstance(value, str | bool)
 
@@ -262,7 +254,6 @@ __all__ = [
     "linear",
     "linear_rgb",
     "mean_texel",
-    "padded",
     "resolve",
     "same_shapes",
     "shape_textures",

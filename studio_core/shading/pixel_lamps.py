@@ -30,6 +30,7 @@ from studio_core.shading.artifacts import (
 from studio_core.shading.brute_force import all_points, lamp_layer
 from studio_core.shading.frame import Frame
 from studio_core.shading.job import Job
+from studio_core.shading.kept import Kept
 from studio_core.shading.normal_maps import NORMAL, normal_texture
 from studio_core.shading.pipeline import Inputs
 from studio_core.shading.surface_points import mapped_points, some_hits, surface_points, surface_uvs
@@ -102,7 +103,7 @@ class PixelLampsMaker:
     def __init__(self, services: Services) -> None:
         self._workers = services.workers
         self._table = ShapeTable(services.registry)
-        self._made: tuple[tuple[object, ...], PixelLamps] | None = None
+        self._made: Kept[PixelLamps] = Kept()
 
     def __call__(self, frame: Frame, inputs: Inputs, made: Radiance) -> Radiance:
         """The same radiance where no lamp can be lit hit by hit."""
@@ -115,22 +116,18 @@ class PixelLampsMaker:
         looks = [frame.scene.material(name) for name in surfaces.materials]
         reliefs = [part for look in looks for part in (normal_texture(look), look.values.get(NORMAL))]
         key = (surfaces, casters, inputs[Shapes], made.hits, *lamps.values(), *reliefs)
-        if self._made is None or not _same(self._made[0], key):
-            scene, table, materials = frame.scene, self._table, surfaces.materials
+        scene, table, materials = frame.scene, self._table, surfaces.materials
+
+        def look(points: ChosenPoints, uvs: F32) -> tuple[ChosenPoints, Shapes]:
+            shapes = dataclasses.replace(table.at(scene, materials, points.material, uvs), tilt=None)
+            return mapped_points(scene, surfaces, points, uvs), shapes
+
+        def fresh() -> PixelLamps:
             eye = np.asarray(frame.view.transform.translation, np.float64)
+            return PixelLamps(surfaces, casters, lamps, eye, look, self._workers)
 
-            def look(points: ChosenPoints, uvs: F32) -> tuple[ChosenPoints, Shapes]:
-                shapes = dataclasses.replace(table.at(scene, materials, points.material, uvs), tilt=None)
-                return mapped_points(scene, surfaces, points, uvs), shapes
-
-            self._made = key, PixelLamps(surfaces, casters, lamps, eye, look, self._workers)
-        if made.pixel is self._made[1]:
-            return made
-        return dataclasses.replace(made, pixel=self._made[1])
-
-
-def _same(a: tuple[object, ...], b: tuple[object, ...]) -> bool:
-    return len(a) == len(b) and all(x is y for x, y in zip(a, b, strict=True))
+        pixel = self._made(fresh, *key)
+        return made if made.pixel is pixel else dataclasses.replace(made, pixel=pixel)
 
 
 __all__ = ["KINDS", "NEEDS", "PixelLamps", "PixelLampsMaker"]

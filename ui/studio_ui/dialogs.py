@@ -63,15 +63,13 @@ class Dialogs:
 
     def take_over(self, name: str, holder: Holder) -> bool:
         """Whether the other machine really has it open no more."""
-        box = QMessageBox(self._parent)
-        box.setIcon(QMessageBox.Icon.Warning)
-        box.setWindowTitle("Open for saving")
-        box.setText(f"Is {name} really not open on {holder.host} any more?")
-        box.setInformativeText("If it is, whoever saves last overwrites what the other one did.")
-        take = box.addButton("Open for saving", QMessageBox.ButtonRole.AcceptRole)
-        box.setDefaultButton(box.addButton(QMessageBox.StandardButton.Cancel))
-        box.exec()
-        return box.clickedButton() is take
+        return self._sure(
+            QMessageBox.Icon.Warning,
+            "Open for saving",
+            f"Is {name} really not open on {holder.host} any more?",
+            "If it is, whoever saves last overwrites what the other one did.",
+            ("Open for saving", QMessageBox.ButtonRole.AcceptRole),
+        )
 
     def version(self, name: str, found: Sequence[Outline]) -> Outline | None:
         """One of the saved versions."""
@@ -82,29 +80,44 @@ class Dialogs:
 
     def compact(self, name: str, versions: int) -> bool:
         """Whether earlier versions may go."""
-        box = QMessageBox(self._parent)
-        box.setIcon(QMessageBox.Icon.Question)
-        box.setWindowTitle("Compact project")
         what = {0: "There is no earlier version", 1: "One earlier version goes"}
-        box.setText(f"Save {name} and make its file smaller?")
         text = what.get(versions, f"{versions} earlier versions go")
-        box.setInformativeText(f"{text}; the undo history stays.")
-        shrink = box.addButton("Compact", QMessageBox.ButtonRole.AcceptRole)
-        box.setDefaultButton(box.addButton(QMessageBox.StandardButton.Cancel))
-        box.exec()
-        return box.clickedButton() is shrink
+        return self._sure(
+            QMessageBox.Icon.Question,
+            "Compact project",
+            f"Save {name} and make its file smaller?",
+            f"{text}; the undo history stays.",
+            ("Compact", QMessageBox.ButtonRole.AcceptRole),
+        )
 
     def delete(self, name: str) -> bool:
         """Whether something goes for good."""
+        return self._sure(
+            QMessageBox.Icon.Warning,
+            "Delete for good",
+            f"Delete {name} for good?",
+            "There is no trash here that could keep it.",
+            ("Delete", QMessageBox.ButtonRole.DestructiveRole),
+        )
+
+    def _sure(
+        self,
+        icon: QMessageBox.Icon,
+        title: str,
+        text: str,
+        more: str,
+        button: tuple[str, QMessageBox.ButtonRole],
+    ) -> bool:
+        """Whether the button is pressed; Enter and Escape cancel."""
         box = QMessageBox(self._parent)
-        box.setIcon(QMessageBox.Icon.Warning)
-        box.setWindowTitle("Delete for good")
-        box.setText(f"Delete {name} for good?")
-        box.setInformativeText("There is no trash here that could keep it.")
-        gone = box.addButton("Delete", QMessageBox.ButtonRole.DestructiveRole)
+        box.setIcon(icon)
+        box.setWindowTitle(title)
+        box.setText(text)
+        box.setInformativeText(more)
+        chosen = box.addButton(*button)
         box.setDefaultButton(box.addButton(QMessageBox.StandardButton.Cancel))
         box.exec()
-        return box.clickedButton() is gone
+        return box.clickedButton() is chosen
 
     def import_options(self, question: ImportQuestion) -> ImportChoice | None:
         """Unit, axis and place, with a preview beside a person."""

@@ -12,6 +12,7 @@ from studio_core.scene.nodes import Environment, Scene
 from studio_ui.context import Context, Subscriptions
 from studio_ui.look.fitting import show_what_fits
 from studio_ui.look.icons import icon
+from studio_ui.look.role import set_role
 from studio_ui.look.theme import Theme
 from studio_ui.settings import Settings
 
@@ -129,7 +130,5 @@ class HintBar(QFrame):
         for index, (label, (_, text)) in enumerate(zip(self._labels, STEPS, strict=True)):
             done = index in self._done
             label.setText(f"✓  {text}" if done else f"{index + 1}  {text}")
-            label.setProperty("role", "dim" if done else "")
-            label.style().unpolish(label)
-            label.style().polish(label)
+            set_role(label, "dim" if done else "")
         self._fit()

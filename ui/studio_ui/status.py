@@ -16,6 +16,7 @@ from studio_ui.feed import Freshness, Shown
 from studio_ui.forms.number_style import number_style
 from studio_ui.journal import Entry
 from studio_ui.look.fitting import show_what_fits
+from studio_ui.look.role import set_role
 
 _SHOWN_MS = 9000
 _GAP = 6  # pixels that Qt leaves between the parts
@@ -84,9 +85,7 @@ class StatusBar(QStatusBar):
 
     def say(self, text: str, role: str = "") -> None:
         """A message, for a while."""
-        self.message.setProperty("role", role)
-        self.message.style().unpolish(self.message)
-        self.message.style().polish(self.message)
+        set_role(self.message, role)
         self.message.setText(text)
         self.message.setToolTip(text)
         self._clear.start(_SHOWN_MS)

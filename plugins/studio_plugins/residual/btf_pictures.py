@@ -12,9 +12,10 @@ import re
 import threading
 import zipfile
 import zlib
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import ExitStack, contextmanager
+from contextlib import AbstractContextManager, ExitStack, contextmanager
 from pathlib import Path, PurePosixPath
 
 import numpy as np
@@ -78,7 +79,7 @@ def looks_like(folder: Path) -> bool:
     return False
 
 
-class PictureBtf:
+class PictureBtf(ABC):
     """Pictures by name; the first tells the size."""
 
     def __init__(self, called: str, names: Sequence[str], response: str, source: str) -> None:
@@ -142,11 +143,9 @@ class PictureBtf:
                 values, clipped = (np.stack(part) for part in zip(*done, strict=True))
                 yield Block(group, values, clipped if clipped.any() else None)
 
-    @contextmanager
-    def _opened(self) -> Iterator[_Photographs]:
+    @abstractmethod
+    def _opened(self) -> AbstractContextManager[_Photographs]:
         """What reads a picture by its name, as long as the source is open."""
-        raise NotImplementedError
-        yield
 
 
 class FolderBtf(PictureBtf):

@@ -9,6 +9,7 @@ from PySide6.QtWidgets import QLabel
 from studio_ui.context import Subscriptions
 from studio_ui.files.keeper import Kept
 from studio_ui.files.project_files import ProjectFiles
+from studio_ui.look.role import set_role
 
 
 class SavedLabel(QLabel):
@@ -35,9 +36,7 @@ class SavedLabel(QLabel):
         text, tip, role = told(self._files.keeper.kept, self._files.modified, self._files.read_only)
         if self.text() != text or self.property("role") != role:
             self.setText(text)
-            self.setProperty("role", role)
-            self.style().unpolish(self)
-            self.style().polish(self)
+            set_role(self, role)
         self.setToolTip(tip)
 
 

@@ -8,6 +8,7 @@ from PySide6.QtWidgets import QToolButton
 
 from studio_ui.context import Subscriptions
 from studio_ui.journal import Journal
+from studio_ui.look.role import set_role
 
 
 class Badge(QToolButton):
@@ -39,7 +40,5 @@ class Badge(QToolButton):
         ]
         self.setText(", ".join(parts))
         self.setAccessibleName(f"{self.text()}: show the log" if parts else "Show the log")
-        self.setProperty("role", "problem" if problems else "warning")
-        self.style().unpolish(self)
-        self.style().polish(self)
+        set_role(self, "problem" if problems else "warning")
         self.setVisible(bool(parts))

@@ -25,6 +25,7 @@ from studio_core.fitting import FitRequest, Fitted
 from studio_core.library.lucmat import Kept
 from studio_ui.ask import Ask
 from studio_ui.context import Context
+from studio_ui.look.role import set_role
 from studio_ui.look.theme import GAP, Theme
 from studio_ui.material_fit.order_page import OrderPage
 from studio_ui.material_fit.report_page import ReportPage
@@ -178,10 +179,7 @@ class FitDialog(QDialog):
     def tell(self, text: str, role: str = "dim") -> None:
         """One line under the page."""
         self.told.setText(text)
-        if self.told.property("role") != role:
-            self.told.setProperty("role", role)
-            self.told.style().unpolish(self.told)
-            self.told.style().polish(self.told)
+        set_role(self.told, role)
 
     def closeEvent(self, event: QCloseEvent) -> None:
         """What is under way goes on, in the jobs panel."""

@@ -20,6 +20,7 @@ from PySide6.QtWidgets import (
 )
 
 from studio_core.errors import Cancelled
+from studio_ui.look.role import set_role
 from studio_ui.look.theme import GAP
 from studio_ui.pictures.order import duration
 from studio_ui.pictures.work import Order
@@ -196,10 +197,7 @@ class PictureDialog(QDialog):
     def tell(self, text: str, role: str = "dim") -> None:
         """One line under the preview."""
         self.told.setText(text)
-        if self.told.property("role") != role:
-            self.told.setProperty("role", role)
-            self.told.style().unpolish(self.told)
-            self.told.style().polish(self.told)
+        set_role(self.told, role)
 
     def open_folder(self) -> None:
         """In the system's file manager."""

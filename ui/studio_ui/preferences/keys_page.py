@@ -18,6 +18,7 @@ from PySide6.QtWidgets import (
 )
 
 from studio_ui.actions.catalogue import specs
+from studio_ui.look.role import set_role
 from studio_ui.palette import fuzzy
 from studio_ui.shortcuts import Shortcuts, portable, shown
 
@@ -152,9 +153,7 @@ class KeysPage(QWidget):
 
     def _tell(self, text: str) -> None:
         self.told.setText(text)
-        self.told.setProperty("role", "warning" if self._chosen else "dim")
-        self.told.style().unpolish(self.told)
-        self.told.style().polish(self.told)
+        set_role(self.told, "warning" if self._chosen else "dim")
         self.take.setVisible(bool(self._asked))
 
     def _filter(self, text: str) -> None:
