@@ -196,10 +196,11 @@ class FactoredBtf:
         height, width = self.size
         for group in parts(which, block_size(self.size)):
             values = np.empty((len(group), height * width, 3), np.float32)
-            for c in range(3):
-                values[..., c] = np.asarray(self._pairs(c)[group], np.float32) @ texels[c].T
-            values = self._colours(values)
-            values *= self._cosine[group, None, None].astype(np.float32)
+            with np.errstate(invalid="ignore", over="ignore"):  # of damaged numbers, which become 0
+                for c in range(3):
+                    values[..., c] = np.asarray(self._pairs(c)[group], np.float32) @ texels[c].T
+                values = self._colours(values)
+                values *= self._cosine[group, None, None].astype(np.float32)
             values = np.nan_to_num(np.maximum(values, np.float32(0)), copy=False, posinf=0.0)
             yield Block(group, values.reshape(len(group), height, width, 3))
 
