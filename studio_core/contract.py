@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 API = 1
 KINDS = (
     "backend",
+    "indirect",
     "solver",
     "brdf",
     "importer",
@@ -219,6 +220,22 @@ class ShadingBackend(Protocol):
         ...
 
 
+class IndirectMethod(Protocol):
+    """A way to compute light that goes on between surfaces, over any backend; `Params` is made with `param`."""
+
+    id: str
+    label: str
+    Params: type
+
+    def stages(self, services: Services) -> Sequence[Stage]:
+        """Fresh stages, in order; the last gives `Indirect`, with `frame.indirect.params` for parameters.
+
+        They may need Surfaces, Casters, Shapes, Lighting, Receivers and DirectRadiance. Surfaces and Shapes
+        are those of the unrefined meshes; DirectRadiance has surfaces of its own, refined or not.
+        """
+        ...
+
+
 class Capturer(Protocol):
     """Makes light out of photographs of a room."""
 
@@ -275,6 +292,7 @@ __all__ = [
     "Fitter",
     "ImportedModel",
     "Importer",
+    "IndirectMethod",
     "Job",
     "PanelMaker",
     "Plugin",

@@ -266,7 +266,8 @@ class Radiance:
 
     B(x, ω_o) = Σ_layers gain · Σ_k c_k · terms[k]. `valid` marks the vertices that were computed.
     `directions` says how finely, `final` whether it is as fine as asked for. In a picture `pixel` stands in
-    the place of its own lights' layers.
+    the place of its own lights' layers. `indirect` is light that came by way of other surfaces, from all
+    lights together with their gains.
     """
 
     surfaces: Surfaces
@@ -277,15 +278,19 @@ class Radiance:
     final: bool
     counts: Mapping[str, int] = field(default_factory=dict)
     pixel: PixelLight | None = None
+    indirect: LayerRadiance | None = None
 
     @property
     def width(self) -> int:
         """T of the layers' terms (V, T, 3)."""
-        return next((layer.terms.shape[1] for layer in self.layers.values()), 1)
+        own = () if self.indirect is None else (self.indirect,)
+        return next((layer.terms.shape[1] for layer in (*self.layers.values(), *own)), 1)
 
     def combined(self, lights: Mapping[NodeId, Light]) -> F32:
         """(V, T, 3): the layers weighted with the gains of `lights`; layers without a light are off."""
         made = np.zeros((len(self.valid), self.width, 3), np.float32)
+        if self.indirect is not None:
+            made += self.indirect.terms
         for node, layer in self.layers.items():
             if node in lights:
                 made += layer.terms * np.asarray(lights[node].gain(), np.float32)
@@ -294,10 +299,41 @@ class Radiance:
     def irradiance(self, lights: Mapping[NodeId, Light]) -> F32:
         """(V, 3): the same for irradiance."""
         made = np.zeros((len(self.valid), 3), np.float32)
+        if self.indirect is not None:
+            made += self.indirect.irradiance
         for node, layer in self.layers.items():
             if node in lights:
                 made += layer.irradiance * np.asarray(lights[node].gain(), np.float32)
         return made
+
+
+@dataclass(frozen=True)
+class DirectRadiance(Radiance):
+    """What a backend made of light that comes straight from lamps and environment."""
+
+
+@dataclass(frozen=True, eq=False)
+class Receivers:
+    """Which vertices (V,) of the unrefined meshes the picture needs, and `eye` (3,) in the world."""
+
+    seen: npt.NDArray[np.bool_]
+    eye: npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Indirect:
+    """Light that came by way of other surfaces, at vertices of the unrefined meshes of `surfaces`.
+
+    `layer` has the gains of all lights in it; it holds where `valid`. `final` tells whether it is as exact as
+    asked for. `counts` tells of the work, `facts` of the method, in the words of the field: numbers alone.
+    """
+
+    surfaces: Surfaces
+    layer: LayerRadiance
+    valid: npt.NDArray[np.bool_]
+    final: bool
+    counts: Mapping[str, int] = field(default_factory=dict)
+    facts: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -400,10 +436,12 @@ __all__ = [
     "Backdrop",
     "Casters",
     "ChosenPoints",
+    "DirectRadiance",
     "EdgeHits",
     "Error",
     "Ground",
     "Hits",
+    "Indirect",
     "Lamp",
     "LayerRadiance",
     "Lighting",
@@ -411,6 +449,7 @@ __all__ = [
     "Picture",
     "PixelLight",
     "Radiance",
+    "Receivers",
     "ShadingPoints",
     "Shapes",
     "Source",

@@ -50,7 +50,7 @@ class Embosser:
     ) -> Relief | None:
         """For the lights that are on."""
         reliefs, mesh = table.reliefs, radiance.surfaces.mesh
-        if reliefs is None or all(layer.tilts is None for layer in radiance.layers.values()):
+        if reliefs is None or all(layer.tilts is None for _, layer in lit(scene, radiance)):
             return None
         count, width = len(radiance.valid), table.width
         bend = np.zeros((count, BEND), np.float32)
@@ -71,8 +71,12 @@ class Embosser:
 
 
 def lit(scene: Scene, radiance: Radiance) -> list[tuple[F32, LayerRadiance]]:
-    """The layers of lights that are on and not summed in every pixel, each with its gain (3,)."""
-    made, apart = [], radiance.pixel.nodes if radiance.pixel is not None else frozenset()
+    """The layers of lights that are on and not summed in every pixel, each with its gain (3,).
+
+    So is light that came by way of other surfaces; it has its gains in it.
+    """
+    apart = radiance.pixel.nodes if radiance.pixel is not None else frozenset()
+    made = [] if radiance.indirect is None else [(np.ones(3, np.float32), radiance.indirect)]
     for node, layer in radiance.layers.items():
         light = scene.nodes.get(node)
         if isinstance(light, Light) and scene.shown(node) and node not in apart:

@@ -10,10 +10,18 @@ from studio_core.session import View
 
 
 @dataclass(frozen=True)
+class IndirectChoice:
+    """A method of the registry's kind `indirect`, and its parameters."""
+
+    method: str
+    params: Any
+
+
+@dataclass(frozen=True)
 class Frame:
     """Scene, view and the backend's parameters; `revision` grows with every request.
 
-    While `moving`, somebody drags or looks around: soon is better than exact, and a frame at rest, with
+    `indirect` says how light goes on between surfaces; None: not at all. While `moving`, somebody drags or looks around: soon is better than exact, and a frame at rest, with
     changes of at least VIEW, follows.
     """
 
@@ -22,3 +30,4 @@ class Frame:
     params: Any
     revision: int = 0
     moving: bool = False
+    indirect: IndirectChoice | None = None

@@ -130,7 +130,9 @@ class CasterStage:
             mesh, matrix = node.geometry, transform.matrix()
             faces = np.array(stops, np.bool_)[mesh.slots]
             shadow.append(CasterObject(mesh.positions, mesh.faces, mesh.key, matrix, faces))
-            primary.append(CasterObject(part.positions, part.faces, key, matrix, None))
+            primary.append(
+                CasterObject(part.positions, part.faces, key, matrix, np.array(stops, np.bool_)[part.slots])
+            )
         job.checkpoint()
         lend = (previous.shadow, previous.primary) if previous is not None else (None, None)
         casters = (RayCaster(shadow, previous=lend[0]), RayCaster(primary, previous=lend[1]))

@@ -1,0 +1,1 @@
+"""Light from surface to surface: rays that are traced once and kept, what they see, what it sends back."""

@@ -1,0 +1,62 @@
+"""Directions above a surface as cells: 16 rings of equal angle × 64 equal parts of a turn, in its own frame.
+
+A function of two directions that knows no azimuth of its own is block-circulant over such cells, so it comes
+apart by Fourier series around the normal.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+
+import numpy as np
+import numpy.typing as npt
+
+from studio_core.jit import kernel
+
+F32 = npt.NDArray[np.float32]
+
+RINGS, PARTS = 16, 64
+CELLS = RINGS * PARTS
+_PER_RADIAN = RINGS / (math.pi / 2)
+_PER_TURN = PARTS / (2 * math.pi)
+
+
+@kernel
+def cell_of(x: float, y: float, z: float) -> int:
+    """The cell of a unit direction in the surface's frame (z is the normal); of z ≤ 0 the nearest one."""
+    ring = min(int(math.acos(min(max(z, 0.0), 1.0)) * _PER_RADIAN), RINGS - 1)
+    turn = math.atan2(y, x) * _PER_TURN
+    if turn < 0.0:
+        turn += PARTS
+    return ring * PARTS + min(int(turn), PARTS - 1)
+
+
+@functools.cache
+def cell_directions() -> F32:
+    """(CELLS, 3) unit directions in the middle of the cells."""
+    theta = (np.arange(RINGS) + 0.5) / _PER_RADIAN
+    phi = (np.arange(PARTS) + 0.5) / _PER_TURN
+    theta, phi = np.repeat(theta, PARTS), np.tile(phi, RINGS)
+    made = np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], axis=1)
+    found: F32 = made.astype(np.float32)
+    found.setflags(write=False)
+    return found
+
+
+@functools.cache
+def cell_solid_angles() -> F32:
+    """(CELLS,) steradians; 2π in all."""
+    edges = np.cos(np.arange(RINGS + 1) / _PER_RADIAN)
+    found: F32 = np.repeat((edges[:-1] - edges[1:]) / _PER_TURN, PARTS).astype(np.float32)
+    found.setflags(write=False)
+    return found
+
+
+@functools.cache
+def cell_projected_angles() -> F32:
+    """(CELLS,) steradians times the cosine with the normal, exactly; π in all."""
+    edges = np.cos(np.arange(RINGS + 1) / _PER_RADIAN) ** 2
+    found: F32 = np.repeat((edges[:-1] - edges[1:]) / (2 * _PER_TURN), PARTS).astype(np.float32)
+    found.setflags(write=False)
+    return found
