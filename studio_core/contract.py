@@ -221,7 +221,7 @@ class ShadingBackend(Protocol):
 
 
 class IndirectMethod(Protocol):
-    """A way to compute light that goes on between surfaces, over any backend; `Params` is made with `param`."""
+    """A way to compute light that goes on between surfaces, over any backend."""
 
     id: str
     label: str

@@ -21,8 +21,8 @@ class IndirectChoice:
 class Frame:
     """Scene, view and the backend's parameters; `revision` grows with every request.
 
-    `indirect` says how light goes on between surfaces; None: not at all. While `moving`, somebody drags or looks around: soon is better than exact, and a frame at rest, with
-    changes of at least VIEW, follows.
+    While `moving`, somebody drags or looks around: soon is better than exact, and a frame at rest, with
+    changes of at least VIEW, follows. `indirect` says how light goes on between surfaces; None: not at all.
     """
 
     scene: Scene
