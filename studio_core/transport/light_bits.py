@@ -1,0 +1,201 @@
+"""What points see of the samples of lights: traced once, kept as bits, mended after a move.
+
+A pair of point and sample is traced again only where the point or the sample has moved, or where something
+that moved was or is between them. What is still to be traced is kept as marks beside the bits, so an update
+that was cancelled is gone on with by the next.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from studio_core.kernels.raycast import RayCaster
+from studio_core.kernels.visibility import lifted
+from studio_core.parallel import Checkpoints, Workers
+from studio_core.scene.transform import Transform
+from studio_core.scene.world_mesh import WorldMesh
+from studio_core.shading.artifacts import Casters
+from studio_core.transport.light_kernels import mark_moved, repack, trace_pairs
+from studio_core.transport.light_samples import LightSamples
+
+F32 = npt.NDArray[np.float32]
+F64 = npt.NDArray[np.float64]
+I32 = npt.NDArray[np.int32]
+I64 = npt.NDArray[np.int64]
+U64 = npt.NDArray[np.uint64]
+
+PAIRS_A_CHUNK = 1 << 15
+_ALL = ~np.uint64(0)
+_MARGIN = 1e-5  # of a sphere's radius
+
+
+@dataclass(frozen=True, eq=False)
+class LitPoints:
+    """Vertices of a mesh, all of them or some, and which object each belongs to."""
+
+    origin: F64
+    positions: F32
+    normals: F32
+    geometric: F32
+    inset: F32
+    object: I32
+
+    @staticmethod
+    def of(mesh: WorldMesh, some: I64 | None = None) -> LitPoints:
+        """All of a mesh, or those that are named."""
+        at = slice(None) if some is None else some
+        return LitPoints(
+            mesh.origin,
+            np.ascontiguousarray(mesh.positions[at]),
+            np.ascontiguousarray(mesh.normals[at]),
+            np.ascontiguousarray(mesh.geometric[at]),
+            np.ascontiguousarray(mesh.inset[at]),
+            np.ascontiguousarray(mesh.object[at]),
+        )
+
+    def __len__(self) -> int:
+        return len(self.positions)
+
+
+class LightBits:
+    """Bits (V, W) of points and columns of samples; `seen` is right after every `update` that returns.
+
+    Owned by the compute thread.
+    """
+
+    def __init__(self, workers: Workers) -> None:
+        self._workers = workers
+        self._caster: RayCaster | None = None
+        self._transforms: tuple[Transform, ...] = ()
+        self._spheres = np.zeros((0, 4))
+        self._keys: tuple[tuple[object, int], ...] = ()
+        self._variants = 0
+        self._order = np.zeros(0, np.int32)
+        self.seen: U64 = np.zeros((0, 0), np.uint64)
+        self._todo: U64 = np.zeros((0, 0), np.uint64)
+
+    @property
+    def nbytes(self) -> int:
+        """Memory of what is kept."""
+        return self.seen.nbytes + self._todo.nbytes + self._order.nbytes
+
+    def update(
+        self, points: LitPoints, casters: Casters, samples: LightSamples, job: Checkpoints | None = None
+    ) -> tuple[int, int]:
+        """Follows objects and samples; how many pairs were traced and how many were kept.
+
+        `points` belong to the meshes of `casters.primary`, which are what stops light. Where the caster is
+        another one, everything is traced.
+        """
+        caster, relative = casters.primary, samples.relative(points.origin)
+        count, words = len(points), -(-len(samples) // 64)
+        if caster is not self._caster or count != len(self.seen) or samples.variants != self._variants:
+            self.seen = np.zeros((count, words), np.uint64)
+            self._todo = np.full((count, words), _ALL)
+            self._caster, self._variants, self._keys = caster, samples.variants, samples.keys
+            self._order = np.arange(count, dtype=np.int32)
+            self._transforms = casters.transforms
+            self._spheres = _spheres(caster)
+        else:
+            self._follow_samples(samples)
+            self._follow_objects(points, casters, samples, relative)
+        return self._trace(points, samples, relative, job)
+
+    def _follow_samples(self, samples: LightSamples) -> None:
+        """Columns that are still what they were keep their bits; others are marked."""
+        if samples.keys == self._keys:
+            return
+        starts, at = {}, 0
+        for group in self._keys:
+            starts[group] = at
+            at += group[1]
+        source = np.concatenate(
+            [
+                np.zeros(0, np.int64),
+                *(starts[g] + np.arange(g[1]) if g in starts else np.full(g[1], -1) for g in samples.keys),
+            ]
+        ).astype(np.int64)
+        shape = (len(self.seen), -(-len(source) // 64))
+        seen, todo = np.zeros(shape, np.uint64), np.zeros(shape, np.uint64)
+        repack(self.seen, source, seen)
+        repack(self._todo, source, todo)
+        self.seen, self._todo, self._keys = seen, todo, samples.keys
+
+    def _follow_objects(self, points: LitPoints, casters: Casters, samples: LightSamples, place: F64) -> None:
+        """Marks what a move may have changed. Never stopped halfway: marks and transforms belong together."""
+        pairs = enumerate(zip(casters.transforms, self._transforms, strict=True))
+        moved = [index for index, (now, before) in pairs if now != before]
+        if not moved:
+            return
+        shift = np.append(points.origin, 0.0)
+        spheres = _spheres(casters.primary)
+        before, now = self._spheres[moved] - shift, spheres[moved] - shift
+        self._todo[np.isin(points.object, moved)] = _ALL
+        if len(samples):
+            self._workers.run(
+                len(points),
+                max(64, PAIRS_A_CHUNK // len(samples)),
+                lambda start, stop: mark_moved(
+                    points.positions,
+                    points.normals,
+                    samples.kind,
+                    place,
+                    samples.axis,
+                    samples.cone,
+                    before,
+                    now,
+                    self.seen,
+                    self._todo,
+                    start,
+                    stop,
+                ),
+            )
+        self._transforms, self._spheres = casters.transforms, spheres
+
+    def _trace(
+        self, points: LitPoints, samples: LightSamples, place: F64, job: Checkpoints | None
+    ) -> tuple[int, int]:
+        assert self._caster is not None
+        todo = self._order[self._todo[self._order].any(axis=1)] if len(samples) else self._order[:0]
+        with np.errstate(invalid="ignore", over="ignore"):
+            origins = lifted(self._caster, points.positions + points.origin, points.geometric, points.inset)
+        handles = self._caster.handles()
+        counts = np.zeros(len(points), np.int64)
+        shift = points.origin - self._caster.centre
+        gap = 4 * self._caster.epsilon
+
+        def body(start: int, stop: int) -> None:
+            trace_pairs(
+                handles.occluded8,
+                handles.scene,
+                todo,
+                origins,
+                points.positions,
+                points.normals,
+                samples.kind,
+                place,
+                samples.axis,
+                samples.cone,
+                shift,
+                gap,
+                self._todo,
+                self.seen,
+                counts,
+                start,
+                stop,
+            )
+
+        self._workers.run(len(todo), max(64, PAIRS_A_CHUNK // max(len(samples), 1)), body, job)
+        rays = int(counts.sum())
+        self._caster.count(rays)
+        return rays, len(points) * len(samples) - rays
+
+
+def _spheres(caster: RayCaster) -> F64:
+    """(n, 4) spheres about objects in the world."""
+    parts = [caster.part(index) for index in range(len(caster))]
+    made = np.array([[*part.centre, part.radius * (1 + _MARGIN)] for part in parts], np.float64)
+    return made.reshape(-1, 4)
