@@ -61,7 +61,7 @@ def lamp_targets(lamp: Lamp, samples: int) -> F64:
     """
     if lamp.kind == "directional":
         discs = _disc(1 if lamp.angle <= 0 else samples)
-        tangent, bitangent = _tangents(-lamp.axis)
+        tangent, bitangent = disc_axes(lamp.axis)
         spread = math.tan(lamp.angle / 2)
         aim = -lamp.axis + spread * (discs[:, :1] * tangent + discs[:, 1:] * bitangent)
         aim /= np.linalg.norm(aim, axis=1, keepdims=True)
@@ -107,7 +107,9 @@ def _disc(count: int) -> F64:
     return np.stack([radius * np.cos(turn), radius * np.sin(turn)], axis=1)
 
 
-def _tangents(axis: F64) -> tuple[F64, F64]:
+def disc_axes(axis: F64) -> tuple[F64, F64]:
+    """Two unit vectors across the disc of a sun that shines along `axis`."""
+    axis = -axis
     other = np.array([0.0, 1.0, 0.0]) if abs(axis[1]) < 0.9 else np.array([1.0, 0.0, 0.0])
     tangent = np.cross(other, axis)
     tangent /= np.linalg.norm(tangent)
