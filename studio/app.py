@@ -61,9 +61,11 @@ class PluginShading:
     def pipeline(self, backend: str) -> Pipeline:
         """The backend's stages and the picture they end in."""
         from studio_core.raster import PictureStage
+        from studio_core.shading.indirect import with_indirect
 
         found: ShadingBackend = self._services.registry.get("backend", backend)
-        return Pipeline([*found.stages(self._services), PictureStage(self._services)])
+        stages = with_indirect(found.stages(self._services), self._services)
+        return Pipeline([*stages, PictureStage(self._services)])
 
     def measure(self, pipeline: Pipeline, frame: Frame, job: Job) -> MeasuredError | None:
         """The error of what the pipeline last made."""

@@ -19,6 +19,7 @@ from studio_core.guards import guarded
 GROUP = "studio.plugins"
 _NEEDS = {
     "backend": ("id", "label", "Params", "stages"),
+    "indirect": ("id", "label", "Params", "stages"),
     "brdf": ("id", "label", "Params", "terms", "textures", "address", "shape", "coefficients"),
     "importer": ("label", "extensions", "load"),
     "exporter": ("label", "extensions", "save"),
@@ -226,7 +227,7 @@ class PluginHost:
         missing = [name for name in _NEEDS.get(kind, ()) if not _has(made, name)]
         if missing:
             raise PluginError(f"{where} lacks {', '.join(missing)}")
-        if kind == "backend" and not dataclasses.is_dataclass(made.Params):
+        if kind in ("backend", "indirect") and not dataclasses.is_dataclass(made.Params):
             raise PluginError(f"{where} has Params that are no dataclass")
         return made
 

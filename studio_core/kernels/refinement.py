@@ -84,6 +84,28 @@ def lift(between: I64, mass: F64) -> None:
 
 
 @kernel
+def spread(between: I64, known: Bools, values: F32) -> None:
+    """Values (V, C) of vertices that refinement made become the mean of the two they lie between.
+
+    between as in `descend`. `known` (V,) tells which vertices have values; where one of two ends has, its own
+    are taken over.
+    """
+    for i in range(len(between)):
+        p, q = between[i, 0], between[i, 1]
+        if p == q:
+            continue
+        known[i] = known[p] or known[q]
+        if not known[i]:
+            continue
+        if not known[p]:
+            p = q
+        elif not known[q]:
+            q = p
+        for c in range(values.shape[1]):
+            values[i, c] = np.float32(0.5) * (values[p, c] + values[q, c])
+
+
+@kernel
 def far_corners(
     positions: F32, corners: I64, radiance: F32, order: I64, start: I64, count: I64, missed: F64
 ) -> None:

@@ -29,7 +29,8 @@ class Aspect(Flag):
     """What kind of thing changed; stages name what dirties them.
 
     GAIN is the part of LIGHT that is linear (intensity, tint, temperature; whether it is seen): a weighted
-    sum, no new light sum. NAME covers what no picture shows.
+    sum, no new light sum. NAME covers what no picture shows. VIEW, QUALITY and INDIRECT (how light between
+    surfaces is computed, and whether it is looked at) are never part of the document.
     """
 
     NONE = 0
@@ -43,6 +44,7 @@ class Aspect(Flag):
     VIEW = auto()
     QUALITY = auto()
     NAME = auto()
+    INDIRECT = auto()
 
 
 EVERYTHING = ~Aspect.NONE

@@ -40,6 +40,19 @@ class FaceTree:
         """Of a mesh that is as it was."""
         return _tree(~np.arange(faces), np.zeros((0, PARTS)), np.zeros((0, PARTS, 6)))
 
+    def origins(self) -> I32:
+        """(F,) of each face of the refined mesh, the face of the unrefined mesh that it is (a part of)."""
+        leaves = (self.root < 0).sum() + (self.part < 0).sum()
+        made = np.empty(int(leaves), np.int32)
+        reference, face = self.root, np.arange(len(self.root), dtype=np.int32)
+        while len(reference):
+            whole = reference < 0
+            made[~reference[whole]] = face[whole]
+            reference, face = self.part[reference[~whole]], np.repeat(face[~whole], PARTS)
+            there = reference.reshape(-1) != NO_PART
+            reference, face = reference.reshape(-1)[there], face[there]
+        return made
+
     def grown(self, before: ShadingMesh, after: ShadingMesh, parent: Ints) -> FaceTree:
         """After one more round, which made `after`; `parent` as `refined` gives it."""
         count = np.bincount(parent, minlength=len(before.faces))

@@ -267,7 +267,7 @@ class Radiance:
     B(x, ω_o) = Σ_layers gain · Σ_k c_k · terms[k]. `valid` marks the vertices that were computed.
     `directions` says how finely, `final` whether it is as fine as asked for. In a picture `pixel` stands in
     the place of its own lights' layers. `indirect` is light that came by way of other surfaces, from all
-    lights together with their gains.
+    lights together with their gains, and `facts` tell of its method.
     """
 
     surfaces: Surfaces
@@ -279,6 +279,7 @@ class Radiance:
     counts: Mapping[str, int] = field(default_factory=dict)
     pixel: PixelLight | None = None
     indirect: LayerRadiance | None = None
+    facts: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def width(self) -> int:

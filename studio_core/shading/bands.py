@@ -34,7 +34,8 @@ from studio_core.shading.artifacts import (
 )
 from studio_core.shading.backdrop import BackdropPainter
 from studio_core.shading.error_meter import ErrorMeter
-from studio_core.shading.frame import Frame
+from studio_core.shading.frame import ALL, Frame, IndirectChoice
+from studio_core.shading.indirect import with_indirect
 from studio_core.shading.job import Job
 from studio_core.shading.job_parts import JobPart
 from studio_core.shading.lamps import shown_environment
@@ -48,6 +49,8 @@ GUIDE_SAMPLES = 1 << 23  # 1920 × 1080 with 2 × 2 samples
 BAND_SAMPLES = 1 << 22
 MARGIN = 2  # rows: whether something ends in a pixel is seen beside it; even, so that packets stay the same
 COMPOSING = 0.05  # of the time that shading takes, for as many samples as a guide has
+BETWEEN = "between surfaces"
+"""Among a picture's lights, what came by way of other surfaces."""
 WHITE_SKY = Image(np.ones((1, 2, 3), np.float32))
 
 
@@ -56,7 +59,7 @@ class Parts:
     """What of a picture is asked for besides its colours.
 
     transparent: nothing behind the objects, and `alpha`, which is also where shadows are caught; lights: a
-    picture for every light, which add up.
+    picture for every light, which add up, and one, `BETWEEN`, of what came by way of other surfaces.
     """
 
     transparent: bool = False
@@ -90,10 +93,19 @@ def shading_share(view: View) -> float:
 class PictureMaker:
     """Pictures of one scene after another; what the backend keeps serves the next. For one thread."""
 
-    def __init__(self, backend: ShadingBackend, params: Any, services: Services) -> None:
+    def __init__(
+        self,
+        backend: ShadingBackend,
+        params: Any,
+        services: Services,
+        *,
+        indirect: IndirectChoice | None = None,
+        light: str = ALL,
+    ) -> None:
         self._params, self._services = params, services
+        self._indirect, self._light = indirect, light
         self._spacious = "everywhere" in {f.name for f in dataclasses.fields(params)}
-        self._pipeline = Pipeline(backend.stages(services))
+        self._pipeline = Pipeline(with_indirect(backend.stages(services), services))
         self._coefficients = CoefficientTable(services.registry)
         self._compositor = Compositor(services.workers)
         self._backdrop = BackdropPainter(services.workers)
@@ -112,7 +124,8 @@ class PictureMaker:
             seen = guide(view, GUIDE_SAMPLES)
             if seen is not view:
                 params = dataclasses.replace(params, everywhere=True)
-        frame = Frame(scene, seen, params, 1 if before is None else before.revision + 1)
+        revision = 1 if before is None else before.revision + 1
+        frame = Frame(scene, seen, params, revision, indirect=self._indirect, light=self._light)
         changed = Changes()
         if before is not None:
             changed = diff(before.scene, scene) | view_changed(Aspect.VIEW | Aspect.QUALITY)
@@ -172,7 +185,7 @@ class PictureMaker:
             unlit = scene if sky is None else scene.with_nodes(_darkened(scene[sky.id]))
             for node in layers_of(scene, radiance):
                 own = scene if sky is not None and node == sky.id else unlit
-                lights[node] = made(own, dataclasses.replace(radiance, layers={node: radiance.layers[node]}))
+                lights[node] = made(own, _alone(radiance, node))
         return Band(hits.view.top + skip, linear, alpha, frozen_map(lights))
 
     def _white(self, scene: Scene, radiance: Radiance, sky: Environment | None) -> tuple[Scene, Radiance]:
@@ -188,7 +201,7 @@ class PictureMaker:
             even = OpenLight(np.ones((96, 192, 3), np.float32)).irradiance(mesh.normals @ turn)
             arrives = (record[:, 3:6] * even).astype(np.float32)
             layers[white.id] = LayerRadiance(np.zeros((len(arrives), radiance.width, 3), np.float32), arrives)
-        return scene.with_nodes(white), dataclasses.replace(radiance, layers=layers)
+        return scene.with_nodes(white), dataclasses.replace(radiance, layers=layers, indirect=None)
 
 
 class _Rounds(JobPart):
@@ -207,8 +220,16 @@ class _Rounds(JobPart):
 
 
 def layers_of(scene: Scene, radiance: Radiance) -> tuple[NodeId, ...]:
-    """The lights that a picture of the scene is made of."""
-    return tuple(n for n in radiance.layers if isinstance(scene.nodes.get(n), Light) and scene.shown(n))
+    """The lights that a picture of the scene is made of; `BETWEEN` where that is among them."""
+    lamps = tuple(n for n in radiance.layers if isinstance(scene.nodes.get(n), Light) and scene.shown(n))
+    return lamps if radiance.indirect is None else (*lamps, BETWEEN)
+
+
+def _alone(radiance: Radiance, node: NodeId) -> Radiance:
+    """With one of `layers_of` alone."""
+    if node == BETWEEN:
+        return dataclasses.replace(radiance, layers={})
+    return dataclasses.replace(radiance, layers={node: radiance.layers[node]}, indirect=None)
 
 
 def rows_of(view: View, most: int) -> list[tuple[int, int]]:

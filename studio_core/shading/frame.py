@@ -8,6 +8,11 @@ from typing import Any
 from studio_core.scene.nodes import Scene
 from studio_core.session import View
 
+ALL, DIRECT, INDIRECT, SHARE = "all", "direct", "indirect", "share"
+LIGHTS = (ALL, DIRECT, INDIRECT, SHARE)
+"""Which light is looked at: all, what comes straight from lamps and sky, what came by way of other surfaces,
+the share of that."""
+
 
 @dataclass(frozen=True)
 class IndirectChoice:
@@ -21,8 +26,9 @@ class IndirectChoice:
 class Frame:
     """Scene, view and the backend's parameters; `revision` grows with every request.
 
-    While `moving`, somebody drags or looks around: soon is better than exact, and a frame at rest, with
-    changes of at least VIEW, follows. `indirect` says how light goes on between surfaces; None: not at all.
+    `indirect` says how light goes on between surfaces; None: not at all. `light`, one of `LIGHTS`, is what is
+    looked at. While `moving`, somebody drags or looks around: soon is better than exact, and a frame at rest,
+    with changes of at least VIEW, follows.
     """
 
     scene: Scene
@@ -31,3 +37,9 @@ class Frame:
     revision: int = 0
     moving: bool = False
     indirect: IndirectChoice | None = None
+    light: str = ALL
+
+    @property
+    def bounced(self) -> IndirectChoice | None:
+        """How light between surfaces is computed for what is looked at; None where none of it is."""
+        return None if self.light == DIRECT else self.indirect

@@ -90,8 +90,13 @@ def surpluses(radiance: F32, valid: Bools, between: I64) -> F64:
     return made
 
 
-def edge_errors(mesh: WorldMesh, hits: Hits, radiance: F32, valid: Bools) -> EdgeErrors:
-    """For radiance (V, 3) at the vertices; faces with a corner that is not `valid` are left out."""
+def edge_errors(
+    mesh: WorldMesh, hits: Hits, radiance: F32, valid: Bools, whole: F32 | None = None
+) -> EdgeErrors:
+    """For radiance (V, 3) at the vertices; faces with a corner that is not `valid` are left out.
+
+    Errors are relative to the mean of `whole` (V, 3), the radiance itself if None.
+    """
     samples = seen_samples(hits, len(mesh.faces))
     faces = np.flatnonzero(samples)
     corners = seen_corners(mesh, hits.view, faces)
@@ -100,7 +105,7 @@ def edge_errors(mesh: WorldMesh, hits: Hits, radiance: F32, valid: Bools) -> Edg
     count = samples[faces].astype(np.float64)
     if not len(faces):
         return EdgeErrors(np.zeros((0, 2), np.int64), np.zeros(0), np.zeros(0), 0.0, 1.0)
-    level = radiance.mean(axis=1, dtype=np.float64)
+    level = (radiance if whole is None else whole).mean(axis=1, dtype=np.float64)
     mean = float((count * level[corners].mean(axis=1)).sum() / count.sum())
     around = edges(corners)
     ends = around.ends

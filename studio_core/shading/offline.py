@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from studio_core.contract import Services, ShadingBackend
+from studio_core.contract import IndirectMethod, Registry, Services, ShadingBackend
 from studio_core.errors import EditError
 from studio_core.kernels.visibility import lifted
 from studio_core.params import build, param_infos, parse
@@ -19,16 +19,22 @@ from studio_core.scene.nodes import Camera, Scene
 from studio_core.session import View, framing
 from studio_core.shading.artifacts import Casters, MeasuredError, Picture, Radiance
 from studio_core.shading.error_meter import ErrorMeter
-from studio_core.shading.frame import Frame
+from studio_core.shading.frame import ALL, Frame, IndirectChoice
+from studio_core.shading.indirect import KIND, with_indirect
 from studio_core.shading.job import Job
 from studio_core.shading.pipeline import Pipeline
 
 
-def backend_params(backend: ShadingBackend, values: Mapping[str, object]) -> Any:
-    """The backend's parameters; texts (from the command line) are parsed, names and ranges checked."""
+def backend_params(backend: ShadingBackend | IndirectMethod, values: Mapping[str, object]) -> Any:
+    """Its parameters; texts (from the command line) are parsed, names and ranges checked."""
     infos = param_infos(backend.Params)
     parsed = {n: parse(n, infos[n], v) if isinstance(v, str) and n in infos else v for n, v in values.items()}
     return build(backend.Params, parsed)
+
+
+def indirect_choice(registry: Registry, method: str, values: Mapping[str, object]) -> IndirectChoice:
+    """A method of light between surfaces with its parameters, as `backend_params` has them."""
+    return IndirectChoice(method, backend_params(registry.get(KIND, method), values))
 
 
 def scene_view(scene: Scene, camera: str | None, width: int, height: int) -> View:
@@ -47,18 +53,33 @@ def scene_view(scene: Scene, camera: str | None, width: int, height: int) -> Vie
 
 
 def shade(
-    scene: Scene, view: View, backend: ShadingBackend, params: Any, services: Services, job: Job | None = None
+    scene: Scene,
+    view: View,
+    backend: ShadingBackend,
+    params: Any,
+    services: Services,
+    job: Job | None = None,
+    *,
+    indirect: IndirectChoice | None = None,
 ) -> Radiance:
     """Radiance at the shading vertices."""
-    return shaded_pipeline(scene, view, backend, params, services, job)[0]
+    return shaded_pipeline(scene, view, backend, params, services, job, indirect=indirect)[0]
 
 
 def shaded_pipeline(
-    scene: Scene, view: View, backend: ShadingBackend, params: Any, services: Services, job: Job | None = None
+    scene: Scene,
+    view: View,
+    backend: ShadingBackend,
+    params: Any,
+    services: Services,
+    job: Job | None = None,
+    *,
+    indirect: IndirectChoice | None = None,
 ) -> tuple[Radiance, Pipeline]:
     """The same, with the pipeline that has made it and holds the other artifacts."""
-    pipeline = Pipeline(backend.stages(services))
-    made: Radiance = pipeline.update(Frame(scene, view, params, 1), Changes(), job or Job("Shading"))
+    pipeline = Pipeline(with_indirect(backend.stages(services), services))
+    frame = Frame(scene, view, params, 1, indirect=indirect)
+    made: Radiance = pipeline.update(frame, Changes(), job or Job("Shading"))
     return made, pipeline
 
 
@@ -76,10 +97,19 @@ def ray_origins(pipeline: Pipeline, made: Radiance) -> npt.NDArray[np.float64]:
 
 
 def picture(
-    scene: Scene, view: View, backend: ShadingBackend, params: Any, services: Services, job: Job | None = None
+    scene: Scene,
+    view: View,
+    backend: ShadingBackend,
+    params: Any,
+    services: Services,
+    job: Job | None = None,
+    *,
+    indirect: IndirectChoice | None = None,
+    light: str = ALL,
 ) -> Picture:
-    """The picture that `view` sees, scene-linear."""
-    return measured_picture(scene, view, backend, params, services, 0, job)[0]
+    """The picture that `view` sees, scene-linear; `light` of `studio_core.shading.frame.LIGHTS`."""
+    made = measured_picture(scene, view, backend, params, services, 0, job, indirect=indirect, light=light)
+    return made[0]
 
 
 def measured_picture(
@@ -90,9 +120,12 @@ def measured_picture(
     services: Services,
     places: int,
     job: Job | None = None,
+    *,
+    indirect: IndirectChoice | None = None,
+    light: str = ALL,
 ) -> tuple[Picture, MeasuredError | None]:
     """The same, with its error measured at so many random places; None for 0, or where nothing is seen."""
-    pipeline = Pipeline([*backend.stages(services), PictureStage(services)])
-    frame, job = Frame(scene, view, params, 1), job or Job("Rendering")
+    pipeline = Pipeline([*with_indirect(backend.stages(services), services), PictureStage(services)])
+    frame, job = Frame(scene, view, params, 1, indirect=indirect, light=light), job or Job("Rendering")
     made: Picture = pipeline.update(frame, Changes(), job)
     return made, ErrorMeter(services, places)(pipeline, frame, job) if places else None

@@ -15,7 +15,7 @@ from studio_core.imaging.rows import Facts
 from studio_core.scene.nodes import Scene
 from studio_core.session import View
 from studio_core.shading.artifacts import MeasuredError, Radiance
-from studio_core.shading.bands import Band, Parts, PictureMaker, layers_of, shading_share
+from studio_core.shading.bands import BETWEEN, Band, Parts, PictureMaker, layers_of, shading_share
 from studio_core.shading.job import Job
 from studio_core.shading.job_parts import JobPart
 
@@ -67,7 +67,7 @@ def write_view(
         told["lucarne:error"] = str(error.picture)
     shaded = time.perf_counter()
     nodes = layers_of(scene, radiance) if parts.lights else ()
-    names = channel_names(tuple(scene[node].name for node in nodes))
+    names = channel_names(tuple(BETWEEN if node == BETWEEN else scene[node].name for node in nodes))
     total, count = 0.0, view.width * view.height * 3
     size = (view.width, view.height)
     with PictureFile(path, size, finish, alpha=parts.transparent, lights=names, facts=told) as file:

@@ -28,12 +28,16 @@ MOST_ROUNDS = 12
 
 @dataclass(frozen=True)
 class Inputs:
-    """What a stage gets: the artifacts it needs, what changed since it last succeeded, what it gave then."""
+    """What a stage gets: the artifacts it needs, what changed since it last succeeded, what it gave then.
+
+    `round` is not 0 in what follows the first round of a frame at rest.
+    """
 
     artifacts: Mapping[type, Any]
     changes: Changes
     previous: Any = None
     rebuilt: frozenset[type] = frozenset()
+    round: int = 0
 
     def __getitem__(self, kind: type[A]) -> A:
         found: A = self.artifacts[kind]
@@ -109,10 +113,14 @@ class StageRun:
 
 
 class Pipeline:
-    """Runs stages in order over frames. Owned by the compute thread."""
+    """Runs stages in order over frames. Owned by the compute thread.
 
-    def __init__(self, stages: Sequence[Stage]) -> None:
-        given: set[type] = set()
+    Artifacts of the kinds `handed` are not made here: they are handed over with every frame, and count as
+    rebuilt where they are other objects than before.
+    """
+
+    def __init__(self, stages: Sequence[Stage], handed: Sequence[type] = ()) -> None:
+        given: set[type] = set(handed)
         for stage in stages:
             missing = [need.__name__ for need in stage.needs if need not in given]
             if missing:
@@ -125,6 +133,8 @@ class Pipeline:
         self.rounds = 0
         self.report: list[StageRun] = []
         self._records: list[_Record] | None = None
+        self._handed: dict[type, tuple[Any, int]] = dict.fromkeys(handed, (None, 0))
+        self._asking: list[int] = []
 
     def artifact(self, kind: type[A]) -> A | None:
         """What the stage that gives `kind` last made, or None."""
@@ -152,33 +162,34 @@ class Pipeline:
         While the frame is at rest, stages are asked for further rounds. What follows the first round is
         spare work: any change that concerns a stage disturbs it.
         """
-        self.mark(frame, changes)
-        self.report, self.rounds = [], 0
-        result = self._round(frame, job)
+        result = self.start(frame, changes, job)
         able = any(isinstance(stage, Refining) for stage in self.stages)
         while not frame.moving:
             self.current = len(self.stages) - 1
             first = able and not self.rounds and self.report[-1].rebuilt
             if first:
                 job.publish(result)  # to ask can take longer than the edit itself
-            asking = self._asking(frame, job)
-            if not asking:
+            if not self.wants_more(frame, job):
                 break
             if not first:
                 job.publish(result)
-            self.rounds += 1
-            try:
-                with job.unheard():
-                    result = self._round(frame, job)
-            except BaseException:
-                self._abandon(asking)
-                raise
+            result = self.refine(frame, job)
         return result
 
-    def _asking(self, frame: Frame, job: Job) -> list[int]:
-        """Which stages want another round; none when there were too many."""
+    def start(
+        self, frame: Frame, changes: Changes, job: Job, handed: Mapping[type, Any] | None = None
+    ) -> Any:
+        """The first round of `update` alone, with what is handed over; the last stage's artifact."""
+        self.mark(frame, changes)
+        self._take(handed)
+        self.report, self.rounds = [], 0
+        return self._round(frame, job)
+
+    def wants_more(self, frame: Frame, job: Job) -> bool:
+        """Whether a stage asks for another round; no longer when there were too many."""
         assert self._records is not None
         made = {stage.gives: r.artifact for stage, r in zip(self.stages, self._records, strict=True)}
+        made = {**{kind: artifact for kind, (artifact, _) in self._handed.items()}, **made}
         able = [index for index, stage in enumerate(self.stages) if isinstance(stage, Refining)]
         asking: list[int] = []
         try:
@@ -188,25 +199,45 @@ class Pipeline:
                     asking.append(index)
                     self._records[index].again = True
         except BaseException:
-            self._abandon(able)
+            self._asking = able
+            self.abandon()
             raise
+        self._asking = asking
         if self.rounds == MOST_ROUNDS:
-            self._abandon(asking)
-            return []
-        return asking
+            self.abandon()
+        return bool(self._asking)
 
-    def _abandon(self, indices: Sequence[int]) -> None:
+    def refine(self, frame: Frame, job: Job, handed: Mapping[type, Any] | None = None) -> Any:
+        """Another round: stages that asked for it run, and those to which something else is handed."""
+        self._take(handed)
+        self.rounds += 1
+        try:
+            with job.unheard():
+                return self._round(frame, job)
+        except BaseException:
+            self.abandon()
+            raise
+
+    def abandon(self) -> None:
+        """What was asked for did not come through: stages give again what they gave before."""
         assert self._records is not None
-        for index in indices:
+        for index in self._asking:
             stage = self.stages[index]
             if isinstance(stage, Refining):
                 stage.abandon()
-                self._records[index].again = True  # to give again what it gave before
+                self._records[index].again = True
+        self._asking = []
+
+    def _take(self, handed: Mapping[type, Any] | None) -> None:
+        for kind, artifact in (handed or {}).items():
+            before, stamp = self._handed[kind]
+            if artifact is not before or not stamp:
+                self._handed[kind] = (artifact, stamp + 1)
 
     def _round(self, frame: Frame, job: Job) -> Any:
         """All stages once."""
         assert self._records is not None
-        made: dict[type, tuple[Any, int]] = {}
+        made: dict[type, tuple[Any, int]] = dict(self._handed)
         for index, (stage, record) in enumerate(zip(self.stages, self._records, strict=True)):
             if not self.rounds:
                 self.current = index
@@ -218,7 +249,7 @@ class Pipeline:
             before = record.stamp
             if ran:
                 artifacts = {need: made[need][0] for need in stage.needs}
-                inputs = Inputs(artifacts, record.pending, record.artifact, rebuilt)
+                inputs = Inputs(artifacts, record.pending, record.artifact, rebuilt, self.rounds)
                 so_far = {kind: artifact for kind, (artifact, _) in made.items()}
                 with job.publishing(partial(self._flow, frame, index, so_far, job)):
                     result = stage.run(frame, inputs, job)

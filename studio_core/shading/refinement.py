@@ -25,7 +25,7 @@ from studio_core.scene.face_tree import FaceTree, joined
 from studio_core.scene.nodes import Light, Material, MaterialId, NodeId, Scene
 from studio_core.scene.shading_mesh import ShadingMesh, refined
 from studio_core.scene.world_mesh import WorldMesh
-from studio_core.shading.artifacts import Casters, Hits, Radiance, Surfaces
+from studio_core.shading.artifacts import Casters, DirectRadiance, Hits, Radiance, Surfaces
 from studio_core.shading.frame import Frame
 from studio_core.shading.interpolation import EdgeErrors, edge_errors, squares_saved
 from studio_core.shading.job import Job
@@ -125,7 +125,8 @@ class AdaptiveSurfaceStage(SurfaceStage):
         if self._proposed is not None:
             self._proven, self._proposed = self._proposed, None
         adaptive, surfaces = self._adaptive(frame.params), made[Surfaces]
-        radiance: Radiance = made[Radiance]
+        # More vertices make light between surfaces no finer: what there is of it is only weighed against.
+        radiance: Radiance = made.get(DirectRadiance, made[Radiance])
         if adaptive is None or not radiance.final or radiance.surfaces.mesh is not surfaces.mesh:
             return False
         hits = radiance.hits if radiance.hits is not None else made[Hits]
@@ -136,7 +137,8 @@ class AdaptiveSurfaceStage(SurfaceStage):
             self.reports, self._has_dropped = [], False
         shown = self._radiance(frame.scene, radiance)
         job.checkpoint()
-        errors = edge_errors(surfaces.mesh, hits, shown, radiance.valid)
+        whole = self._whole(frame.scene, made[Radiance], radiance)
+        errors = edge_errors(surfaces.mesh, hits, shown, radiance.valid, whole)
         job.checkpoint()
         saved = partial(squares_saved, surfaces.mesh, hits, shown, radiance.valid)
         proven = self._proven
@@ -153,6 +155,11 @@ class AdaptiveSurfaceStage(SurfaceStage):
         self.reports.append(RoundReport(errors.relative_rmse, len(surfaces.mesh), len(edges)))
         self._proposed, self._content = proposed, (asked, adaptive) if proposed is None else None
         return proposed is not None
+
+    def _whole(self, scene: Scene, all_light: Radiance, direct: Radiance) -> F32 | None:
+        """(V, 3) what is shown in all; None where that is the direct light alone."""
+        together = all_light.indirect is not None and all_light.layers is direct.layers
+        return self._radiance(scene, all_light) if together else None
 
     def abandon(self) -> None:
         """Forget the round under way."""

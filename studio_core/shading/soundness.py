@@ -31,10 +31,12 @@ class Soundness:
             raise UnsoundError(f"it gave {kinds}, not radiance and hits")
         known, mesh = {id(thing) for thing in self._sound}, radiance.surfaces.mesh
         self._sound = ()
-        count, every = len(mesh.positions), [layer.terms for layer in radiance.layers.values()]
+        layers = {**radiance.layers, "other surfaces": radiance.indirect}
+        given = {node: layer for node, layer in layers.items() if layer is not None}
+        count, every = len(mesh.positions), [layer.terms for layer in given.values()]
         width = next((terms.shape[1] for terms in every if getattr(terms, "ndim", 0) == 3), 1)
         _fits("valid", radiance.valid, (count,), np.bool_)
-        for node, layer in radiance.layers.items():
+        for node, layer in given.items():
             _fits(f"terms of {node}", layer.terms, (count, width, 3), np.float32)
             _fits(f"irradiance of {node}", layer.irradiance, (count, 3), np.float32)
             if layer.tilts is not None:
@@ -44,7 +46,7 @@ class Soundness:
                     _finite(numbers, radiance)
         if not (id(hits) in known and id(mesh) in known):
             _check_hits(hits, len(mesh.faces))
-        seen = [part for layer in radiance.layers.values() for part in _numbers(layer)]
+        seen = [part for layer in given.values() for part in _numbers(layer)]
         self._sound = (hits, mesh, *seen)
 
 

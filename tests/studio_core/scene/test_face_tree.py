@@ -45,6 +45,29 @@ def carried(
     return found, *made
 
 
+@given(st.sampled_from(sorted(SHAPES)), st.integers(0, 2**32 - 1), st.integers(0, 4))
+@settings(max_examples=20)
+def test_every_part_knows_the_face_it_comes_from(name: str, seed: int, rounds: int) -> None:
+    rng = np.random.default_rng(seed)
+    base = shade_mesh(SHAPES[name], 1.5)
+    finer, tree = grow(base, rng, rounds)
+    finer_again, other = grow(base, rng, rounds)
+    origins = joined([tree, other]).origins()
+    assert len(origins) == len(finer.faces) + len(finer_again.faces)
+    for made, first, begin in ((finer, 0, 0), (finer_again, len(finer.faces), len(base.faces))):
+        own = origins[first : first + len(made.faces)] - begin
+        face, u, v = somewhere(rng, len(base.faces), 200)
+        part = carried(tree if made is finer else other, face, u, v)[0]
+        np.testing.assert_array_equal(own[part], face)
+        areas = np.bincount(own, _areas(made), minlength=len(base.faces))
+        np.testing.assert_allclose(areas, _areas(base), rtol=1e-4)
+
+
+def _areas(mesh: ShadingMesh) -> npt.NDArray[np.float64]:
+    a, b, c = (mesh.positions[mesh.faces[:, k]].astype(np.float64) for k in range(3))
+    return np.asarray(np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2)
+
+
 def somewhere(
     rng: np.random.Generator, faces: int, count: int
 ) -> tuple[npt.NDArray[np.int32], Floats, Floats]:

@@ -9,6 +9,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from bouncing import Bounce, BounceParams, BouncingHost
 from hypothesis import given
 from hypothesis import strategies as st
 from scenes import little_scene as make_little_scene
@@ -22,7 +23,8 @@ from studio_core.scene.nodes import Camera, Material, PointLamp
 from studio_core.scene.transform import Transform
 from studio_core.session import View
 from studio_core.shading.artifacts import Casters, Surfaces
-from studio_core.shading.bands import Parts, PictureMaker, guide, rows_of
+from studio_core.shading.bands import BETWEEN, Parts, PictureMaker, guide, rows_of
+from studio_core.shading.frame import INDIRECT, IndirectChoice
 from studio_core.shading.job import Job
 from studio_core.shading.job_parts import STEPS, JobPart
 from studio_core.shading.offline import backend_params, picture
@@ -114,6 +116,26 @@ def test_lights_add_up_to_the_picture(make):
     assert set(band.lights) == {"sky", "lamp"}
     np.testing.assert_allclose(sum(band.lights.values()), band.linear, rtol=1e-5, atol=1e-6)
     assert all(light.max() > 0.01 for light in band.lights.values())
+
+
+def test_light_between_surfaces_is_one_of_the_lights(host, workers, monkeypatch):
+    monkeypatch.setattr("studio_core.shading.bands.GUIDE_SAMPLES", 2000)
+    services = Services(workers, BouncingHost(host, {"bounce": Bounce()}))
+    backend, scene = host.get("backend", "reference"), scene_with_glass()
+    choice = IndirectChoice("bounce", BounceParams())
+    maker = PictureMaker(backend, backend_params(backend, PARAMS), services, indirect=choice)
+    maker.shade(scene, view_of(scene), Job("Shading"))
+    for transparent in (False, True):
+        parts = Parts(lights=True, transparent=transparent)
+        for band in maker.bands(Job("Rendering"), parts, most=2000):
+            assert set(band.lights) == {"sky", "lamp", BETWEEN}
+            np.testing.assert_allclose(sum(band.lights.values()), band.linear, rtol=1e-4, atol=1e-5)
+            assert transparent is (band.alpha is not None)
+    alone = PictureMaker(backend, backend_params(backend, PARAMS), services, indirect=choice, light=INDIRECT)
+    alone.shade(scene, view_of(scene), Job("Shading"))
+    bands = [band.linear for band in alone.bands(Job("Rendering"), Parts(transparent=True), most=2000)]
+    lit = [b.lights[BETWEEN] for b in maker.bands(Job(""), Parts(transparent=True, lights=True), most=2000)]
+    np.testing.assert_array_equal(np.concatenate(bands), np.concatenate(lit))
 
 
 def test_over_its_background_a_transparent_picture_is_the_opaque_one(make):
