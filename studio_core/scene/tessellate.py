@@ -295,7 +295,7 @@ def subdivide(mesh: Fan, edge: float) -> Fan:
         active = _stacked(fills) if fills else active
     made = _stacked(done)
     node = filling.at(made.thread, made.start)
-    order = np.lexsort((_curve(filling.points[node[:, :, 0]].mean(axis=1)), made.owner))
+    order = np.lexsort((morton_codes(filling.points[node[:, :, 0]].mean(axis=1)), made.owner))
     node, owner = node[order], made.owner[order]
     return dataclasses.replace(
         mesh,
@@ -312,7 +312,7 @@ def subdivide(mesh: Fan, edge: float) -> Fan:
     )
 
 
-def _curve(points: Floats) -> Ints:
+def morton_codes(points: Floats) -> Ints:
     """Morton order, ten bits an axis: neighbours in space become neighbours in memory."""
     low = points.min(axis=0)
     size = max(float((points.max(axis=0) - low).max()), 1e-300)

@@ -1,0 +1,395 @@
+"""Tracing receivers' rays: whole rows, or only the rays whose hit may be another since objects moved.
+
+After a move a ray of a receiver that stayed is traced again when it had met a moved object, or when a moved
+object now stands in its way (`transport.moved_rays`). All other rays keep their hit.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from studio_core.jit import call_address, kernel
+from studio_core.kernels.packets import (
+    DIRECTION,
+    GEOMETRY,
+    INSTANCE,
+    MASK,
+    NO_HIT,
+    NORMAL,
+    OPAQUE,
+    ORIGIN,
+    PRIMITIVE,
+    TFAR,
+    U,
+    V,
+    clear_hits,
+    new_packet,
+)
+from studio_core.kernels.radiance import surface_frame
+from studio_core.scene.shading_mesh import NO_BACK
+from studio_core.transport.cells import cell_of
+from studio_core.transport.hits import BLACK, NO_OBJECT, NOTHING, half_bits
+from studio_core.transport.moved_rays import TRACE, answer, ask
+
+F32 = npt.NDArray[np.float32]
+F64 = npt.NDArray[np.float64]
+I32 = npt.NDArray[np.int32]
+I64 = npt.NDArray[np.int64]
+U8 = npt.NDArray[np.uint8]
+U16 = npt.NDArray[np.uint16]
+U32 = npt.NDArray[np.uint32]
+U64 = npt.NDArray[np.uint64]
+
+COUNTS = 2
+TRACED, ASKED = range(COUNTS)
+"""Columns of counts: rays traced against the scene, and against one object alone."""
+
+_MIX = np.uint64(0x9E3779B97F4A7C15)
+_STIR = np.uint64(0xD6E8FEB86659FD93)
+_HALF_WORD = np.uint64(32)
+
+
+@kernel
+def chance(stream: int, ray: int) -> float:
+    """A number in [0, 1) of its own for every ray of every stream."""
+    z = (np.uint64(stream) << np.uint64(24)) + np.uint64(ray) + np.uint64(1)
+    z *= _MIX
+    z = (z ^ (z >> _HALF_WORD)) * _STIR
+    z = (z ^ (z >> _HALF_WORD)) * _STIR
+    return np.float64(z >> np.uint64(40)) * (1.0 / 16777216.0)
+
+
+@kernel
+def _prepare(
+    row: int,
+    local: bool,
+    vertex: I64,
+    positions: F32,
+    normals: F32,
+    tangents: F32,
+    geometric: F32,
+    inset: F32,
+    epsilon: float,
+    axes: F64,
+    origin: F64,
+) -> bool:
+    """Frame and start of a row's rays, relative to the mesh's origin; whether they are numbers."""
+    v = vertex[row]
+    if local:
+        surface_frame(normals[v], tangents[v], axes)
+    else:
+        axes[:] = 0.0
+        axes[0, 0] = axes[1, 1] = axes[2, 2] = 1.0
+    size = 0.0
+    for axis in range(3):
+        origin[axis] = float(positions[v, axis]) + epsilon * float(geometric[v, axis]) + float(inset[v, axis])
+        size += abs(origin[axis]) + abs(axes[0, axis]) + abs(axes[1, axis]) + abs(axes[2, axis])
+    return bool(size < np.inf)
+
+
+@kernel
+def _follow(
+    intersect8: int,
+    scene: int,
+    shift: F64,
+    first: int,
+    count: int,
+    which: I64,
+    stream: I64,
+    axes: F64,
+    origin: F64,
+    variant: I32,
+    directions: F32,
+    face_start: I64,
+    face_ids: I32,
+    turns: F32,
+    face_offsets: I64,
+    faces: U32,
+    back_faces: U32,
+    normals: F32,
+    tangents: F32,
+    packet: F32,
+    valid: I32,
+    word: U32,
+    marks: U8,
+    vertex: U32,
+    cell: U16,
+    distance: U16,
+    touched: npt.NDArray[np.bool_],
+) -> int:
+    """Traces the marked rays and writes what they meet; how many."""
+    words = packet.view(np.uint32)
+    rays = directions.shape[1]
+    row_of, ray_of = np.empty(8, np.int64), np.empty(8, np.int64)
+    along = np.empty((8, 3))
+    frame = np.empty((3, 3))
+    used, traced = 0, 0
+    for item in range(rays * count + 1):
+        if item < rays * count:
+            ray, column = item // count, item % count
+            if marks[ray, column] != TRACE:
+                continue
+            row = which[first + column]
+            d = directions[variant[row], ray]
+            t = axes[column]
+            size = 0.0
+            for axis in range(3):
+                along[used, axis] = t[0, axis] * d[0] + t[1, axis] * d[1] + t[2, axis] * d[2]
+                size += abs(along[used, axis])
+                packet[ORIGIN + axis, used] = origin[column, axis] + shift[axis]
+                packet[DIRECTION + axis, used] = along[used, axis]
+            packet[TFAR, used] = np.inf
+            valid[used] = -1 if 0.0 < size < np.inf else 0
+            traced += 1
+            row_of[used], ray_of[used] = row, ray
+            used += 1
+        if used == 8 or (item == rays * count and used > 0):
+            for lane in range(used, 8):
+                valid[lane] = 0
+            clear_hits(packet)
+            call_address(intersect8, valid, scene, packet, 0)
+            for lane in range(used):
+                met, seen, far = np.int64(NOTHING), 0, _far()
+                if valid[lane] != 0 and words[GEOMETRY, lane] != NO_HIT:
+                    thing = np.int64(words[INSTANCE, lane])
+                    slot = face_start[thing, np.int64(words[GEOMETRY, lane])] + np.int64(
+                        words[PRIMITIVE, lane]
+                    )
+                    face = face_offsets[thing] + face_ids[slot]
+                    x, y, z = packet[NORMAL, lane], packet[NORMAL + 1, lane], packet[NORMAL + 2, lane]
+                    facing = 0.0
+                    for axis in range(3):
+                        m = turns[thing, axis]
+                        n = np.float64(m[0]) * x + np.float64(m[1]) * y + np.float64(m[2]) * z
+                        facing += n * along[lane, axis]
+                    u, v = packet[U, lane], packet[V, lane]
+                    number = chance(stream[row_of[lane]], ray_of[lane])
+                    corner = 1 if number < u else (2 if number < u + v else 0)
+                    met = np.int64(faces[face, corner] if facing < 0 else back_faces[face, corner])
+                    far = packet[TFAR, lane]
+                    if met == NO_BACK:
+                        met, seen = np.int64(BLACK), int(thing) if thing < NO_OBJECT else NO_OBJECT
+                    else:
+                        surface_frame(normals[met], tangents[met], frame)
+                        a, b, c = -along[lane, 0], -along[lane, 1], -along[lane, 2]
+                        seen = cell_of(
+                            frame[0, 0] * a + frame[0, 1] * b + frame[0, 2] * c,
+                            frame[1, 0] * a + frame[1, 1] * b + frame[1, 2] * c,
+                            frame[2, 0] * a + frame[2, 1] * b + frame[2, 2] * c,
+                        )
+                row, ray = row_of[lane], ray_of[lane]
+                if vertex[row, ray] != met or cell[row, ray] != seen:
+                    touched[row] = True
+                vertex[row, ray], cell[row, ray] = met, seen
+                distance[row, ray] = half_bits(far, word)
+            used = 0
+    return traced
+
+
+@kernel
+def _far() -> np.float32:
+    return np.float32(np.inf)
+
+
+@kernel
+def update_rows(
+    start: int,
+    stop: int,
+    which: I64,
+    state: I64,
+    moved_start: I64,
+    moved_items: I64,
+    whole: npt.NDArray[np.bool_],
+    local: bool,
+    receiver: I64,
+    variant: I32,
+    stream: I64,
+    directions: F32,
+    positions: F32,
+    normals: F32,
+    tangents: F32,
+    geometric: F32,
+    inset: F32,
+    thing_of: I32,
+    face_offsets: I64,
+    faces: U32,
+    back_faces: U32,
+    shift: F64,
+    epsilon: float,
+    intersect8: int,
+    occluded8: int,
+    scene: int,
+    face_start: I64,
+    face_ids: I32,
+    turns: F32,
+    part_scene: I64,
+    from_mesh: F64,
+    centre: F64,
+    radius: F64,
+    vertex: U32,
+    cell: U16,
+    distance: U16,
+    things_seen: U64,
+    black: U16,
+    touched: npt.NDArray[np.bool_],
+    counts: I64,
+) -> None:
+    """Brings rows which[start:stop] to the present; counts (COUNTS,) is added to.
+
+    state[i] says what which[i] was last traced in: `whole` is everything to be traced, else the objects
+    moved_items[moved_start[state]:moved_start[state + 1]] stood elsewhere.
+    directions (P, N, 3) are in the receivers' frames if `local`, else in the world; variant and stream (R,)
+    are the pattern and the chance of a row, receiver (R,) its vertex.
+    part_scene, from_mesh (n, 3, 4), centre (n, 3) relative to the mesh's origin and radius are the objects
+    alone; shift leads from the mesh's origin to the caster's centre.
+    things_seen (R,) gets a bit for each object that a row meets (its number mod 64), black (R,) how many
+    rays met the inside of a closed part, touched (R,) whether a hit is another.
+    """
+    count = stop - start
+    rays = directions.shape[1]
+    packet, valid = new_packet()
+    packet.view(np.uint32)[MASK, :] = OPAQUE
+    word = np.zeros(1, np.uint32)
+    marks = np.zeros((rays, count), np.uint8)
+    axes, origin = np.empty((count, 3, 3)), np.empty((count, 3))
+    good = np.empty(count, np.bool_)
+    marked = np.zeros(count, np.bool_)
+    pending = np.zeros(len(part_scene), np.bool_)
+    moved_here = np.zeros(len(part_scene), np.bool_)
+    before = np.int64(-1)
+    for column in range(count):
+        row = which[start + column]
+        good[column] = _prepare(
+            row,
+            local,
+            receiver,
+            positions,
+            normals,
+            tangents,
+            geometric,
+            inset,
+            epsilon,
+            axes[column],
+            origin[column],
+        )
+        s = state[start + column]
+        if s != before:  # what moved since
+            moved_here[:] = False
+            bits = np.uint64(0)
+            for k in range(moved_start[s], moved_start[s + 1]):
+                moved_here[moved_items[k]] = True
+                pending[moved_items[k]] = True
+                bits |= np.uint64(1) << np.uint64(moved_items[k] & 63)
+            before = s
+        if not good[column]:
+            for ray in range(rays):
+                vertex[row, ray], cell[row, ray], distance[row, ray] = (
+                    NOTHING,
+                    0,
+                    half_bits(np.float32(np.inf), word),
+                )
+            continue
+        if whole[s] or moved_here[thing_of[receiver[row]]]:
+            marks[:, column] = TRACE
+            marked[column] = True
+        elif things_seen[row] & bits != np.uint64(0):
+            for ray in range(rays):
+                met = np.int64(vertex[row, ray])
+                if met == NOTHING:
+                    continue
+                thing = np.int64(cell[row, ray]) if met == BLACK else np.int64(thing_of[met])
+                if thing >= NO_OBJECT or moved_here[thing]:
+                    marks[ray, column] = TRACE
+                    marked[column] = True
+    for other in range(len(part_scene)):
+        if not pending[other] or part_scene[other] == 0:
+            continue
+        found = 0
+        for column in range(count):
+            row = which[start + column]
+            s = state[start + column]
+            if not good[column] or whole[s]:
+                continue
+            for k in range(moved_start[s], moved_start[s + 1]):
+                if moved_items[k] == other:
+                    asked = ask(
+                        row,
+                        column,
+                        local,
+                        centre[other],
+                        radius[other],
+                        epsilon,
+                        axes[column],
+                        origin[column],
+                        directions[variant[row]],
+                        distance,
+                        word,
+                        marks,
+                    )
+                    found += asked
+                    if asked > 0:
+                        marked[column] = True
+        if found > 0:
+            counts[ASKED] += found
+            answer(
+                occluded8,
+                part_scene[other],
+                from_mesh[other],
+                start,
+                count,
+                which,
+                axes,
+                origin,
+                variant,
+                directions,
+                distance,
+                epsilon,
+                packet,
+                valid,
+                word,
+                marks,
+            )
+    counts[TRACED] += _follow(
+        intersect8,
+        scene,
+        shift,
+        start,
+        count,
+        which,
+        stream,
+        axes,
+        origin,
+        variant,
+        directions,
+        face_start,
+        face_ids,
+        turns,
+        face_offsets,
+        faces,
+        back_faces,
+        normals,
+        tangents,
+        packet,
+        valid,
+        word,
+        marks,
+        vertex,
+        cell,
+        distance,
+        touched,
+    )
+    for column in range(count):
+        row = which[start + column]
+        if not (marked[column] or whole[state[start + column]]):
+            continue
+        bits, inside = np.uint64(0), 0
+        for ray in range(rays):
+            met = np.int64(vertex[row, ray])
+            if met == NOTHING:
+                continue
+            if met == BLACK:
+                inside += 1
+            thing = np.int64(cell[row, ray]) if met == BLACK else np.int64(thing_of[met])
+            bits |= np.uint64(1) << np.uint64(thing & 63) if thing < NO_OBJECT else ~np.uint64(0)
+        things_seen[row], black[row] = bits, inside
