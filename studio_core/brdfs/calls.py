@@ -27,6 +27,11 @@ def evaluate(brdf: Brdf, shape: F32, wo: npt.ArrayLike, wi: npt.ArrayLike) -> F3
     return _values(_EVALUATE(brdf.address), brdf.terms, shape, wo, wi)
 
 
+def evaluate_at(address: int, terms: int, shape: F32, wo: npt.ArrayLike, wi: npt.ArrayLike) -> F32:
+    """`evaluate` of a model of which the address alone is known, as in `studio_core.shading.artifacts.Shapes`."""
+    return _values(_EVALUATE(address), terms, shape, wo, wi)
+
+
 def is_sampled(brdf: Brdf) -> bool:
     """Whether the model draws directions itself; `sample` and `density` need that."""
     return bool(getattr(brdf, "sampler", 0)) and bool(getattr(brdf, "density", 0))
@@ -87,4 +92,4 @@ def _columns(values: npt.ArrayLike, width: int) -> F32:
     return np.ascontiguousarray(rows.T)
 
 
-__all__ = ["density", "evaluate", "is_sampled", "repeatable", "sample"]
+__all__ = ["density", "evaluate", "evaluate_at", "is_sampled", "repeatable", "sample"]

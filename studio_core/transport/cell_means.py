@@ -1,0 +1,284 @@
+"""Reflectance kernels as means over cells of directions, cosine-weighted on both sides.
+
+Light from a mirror-sharp lobe must neither be missed nor counted twice, so a direction's hemisphere is looked
+at twice: on a regular grid of three heights a ring, and on circles around the mirror direction whose radii
+grow exponentially (as in `studio_core.brdfs.quadrature`). Both share the integral by the power heuristic
+(Veach & Guibas 1995) on their densities. What both together get wrong of a cell's own size is made up for
+where values hardly differ inside it: constants are exact, lobes are left alone.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from studio_core.brdfs.calls import evaluate_at
+from studio_core.transport.cells import CELLS, PARTS, RINGS, cell_projected_angles
+
+F32 = npt.NDArray[np.float32]
+F64 = npt.NDArray[np.float64]
+I64 = npt.NDArray[np.int64]
+
+HALF = PARTS // 2
+VIEWS = 3  # heights a ring that are looked from
+HEIGHTS = 3  # and to
+CIRCLES, AROUND = 48, 32  # about the mirror direction, half a turn
+WIDE_CIRCLES, WIDE_AROUND = 24, 16
+GRADE = 12.0
+CONSTANT = 1e-4  # of a term's largest value
+ALIKE = 1e-3  # two values of a kernel that are taken for the same
+ODD = 0.05  # share of probes that may differ: lobes at the edge of float32
+VIEWED, LIT = 16, 24  # directions that probing looks from and to
+
+
+@dataclass(frozen=True)
+class Kernel:
+    """A shape of a model: the C function's address, its terms, and what it reads."""
+
+    address: int
+    terms: int
+    shape: F32
+
+    def __call__(self, wo: npt.ArrayLike, wi: F32) -> F32:
+        """(N, terms) of one wo (3,) and many wi (N, 3)."""
+        return evaluate_at(self.address, self.terms, self.shape, wo, wi)
+
+
+@dataclass(frozen=True)
+class Traits:
+    """What probing finds: `matte` (T,) the value of terms that are constant, else NaN; who is `signed` (T,).
+
+    `turns`: nothing changes when both directions turn around the normal, nor with the sense of turning;
+    `flips` (2,): nor when both are mirrored in x, in y; `reciprocal`: nor when they are exchanged.
+    """
+
+    matte: F64
+    signed: npt.NDArray[np.bool_]
+    turns: bool
+    flips: tuple[bool, bool]
+    reciprocal: bool
+
+
+def ring_measures() -> F64:
+    """(RINGS,) steradians times cosine of whole rings; π in all."""
+    made: F64 = cell_projected_angles().astype(np.float64).reshape(RINGS, PARTS).sum(axis=1)
+    return made
+
+
+@functools.cache
+def _probes() -> tuple[F32, F32, F64]:
+    """Views (N, 3), for each of them light (N, M, 3), half of it near its mirror image, and a turn (N,)."""
+    rng = np.random.default_rng(11)
+    a, b = rng.normal(size=(VIEWED, 1, 3)), rng.normal(size=(VIEWED, LIT, 3))
+    a[..., 2] = np.abs(a[..., 2]) + 0.02
+    a /= np.linalg.norm(a, axis=-1, keepdims=True)
+    near = slice(0, LIT // 2)
+    b[:, near] = a * [-1, -1, 1] + 10.0 ** rng.uniform(-3, -0.3, (VIEWED, LIT // 2, 1)) * b[:, near]
+    b[..., 2] = np.abs(b[..., 2]) + 0.02
+    b /= np.linalg.norm(b, axis=-1, keepdims=True)
+    return a[:, 0].astype(np.float32), b.astype(np.float32), rng.uniform(0.2, 2 * math.pi - 0.2, VIEWED)
+
+
+def _turned(w: F32, turn: F64 | float) -> F32:
+    c, s = np.cos(turn), np.sin(turn)
+    x, y = w[..., 0], w[..., 1]
+    return np.stack([c * x - s * y, s * x + c * y, w[..., 2]], axis=-1).astype(np.float32)
+
+
+def traits(kernel: Kernel) -> Traits:
+    """By evaluating at fixed probes: a model's name says nothing."""
+    a, b, turn = _probes()
+
+    def at(wo: F32, wi: F32) -> F64:
+        return np.stack([kernel(o, i) for o, i in zip(wo, wi, strict=True)]).astype(np.float64)
+
+    plain = at(a, b)
+    low, high = plain.min(axis=(0, 1)), plain.max(axis=(0, 1))
+    largest = np.maximum(np.abs(low), np.abs(high))
+    constant = high - low <= CONSTANT * largest
+    matte = np.where(constant, plain.mean(axis=(0, 1)), np.nan)
+    own = ~constant
+
+    def alike(other: F64, one: F64) -> bool:
+        other, one = other[..., own], one[..., own]
+        limit = ALIKE * np.maximum(np.abs(other), np.abs(one)) + 1e-6 * largest[own]
+        return bool((np.abs(other - one) > limit).mean(axis=(0, 1)).max(initial=0.0) <= ODD)
+
+    across, along = np.array([-1, 1, 1], np.float32), np.array([1, -1, 1], np.float32)
+    mirrored = alike(at(a * along, b * along), plain)
+    turns = mirrored and alike(at(_turned(a, turn), _turned(b, turn[:, None])), plain)
+    flips = (turns or alike(at(a * across, b * across), plain), mirrored)
+    exchanged = b[:, :: LIT // 4]
+    there = plain[:, :: LIT // 4]
+    back = np.stack(
+        [at(i, np.repeat(o[None, None], len(i), 0))[:, 0] for o, i in zip(a, exchanged, strict=True)]
+    )
+    return Traits(matte, low < -1e-6 * largest, turns, flips, alike(back, there))
+
+
+@dataclass(frozen=True)
+class _Look:
+    """Directions (P, 3) seen from one height, first those of the grid (rings, heights, bins, columns).
+
+    Weights dω cosθ of the grid, and of the others with the bins (ring · bins + bin) that they are in;
+    `missing` (rings, bins) is what all of them lack of a bin's own measure.
+    """
+
+    directions: F32
+    grid: F64
+    others: F64
+    bins: I64
+    missing: F64
+
+    def sums(self, values: F32) -> F64:
+        """(rings, bins) integrals of a term's values (P,) over each bin."""
+        regular: F32 = values[: self.grid.size].reshape(self.grid.shape)
+        made: F64 = np.einsum("rhbc,rhbc->rb", regular, self.grid)
+        found = np.bincount(self.bins, values[self.grid.size :] * self.others, minlength=self.missing.size)
+        made += found.reshape(self.missing.shape)
+        _, heights, _, columns = self.grid.shape
+        places = [regular[:, h, :, c] for h in range(heights) for c in range(columns)]
+        least, most = functools.reduce(np.minimum, places), functools.reduce(np.maximum, places)
+        made += self.missing * (np.maximum(2 * least - most, 0.0) + np.minimum(2 * most - least, 0.0))
+        return made
+
+
+def _circles(theta: float, circles: int, around: int) -> tuple[F64, F64]:
+    """(P, 3) around the mirror direction of (sin θ, 0, cos θ), in the half space y > 0, and their dω."""
+    s, f = np.meshgrid(
+        (np.arange(circles) + 0.5) / circles, (np.arange(around) + 0.5) / around * math.pi, indexing="ij"
+    )
+    end = np.arctan2(math.cos(theta), -math.sin(theta) * np.cos(f))
+    away = end * np.expm1(GRADE * s) / math.expm1(GRADE)
+    mirror, up, aside = _mirror_frame(theta)
+    made = np.cos(away)[..., None] * mirror
+    made = made + np.sin(away)[..., None] * (np.cos(f)[..., None] * up + np.sin(f)[..., None] * aside)
+    angle = np.sin(away) * end * GRADE * np.exp(GRADE * s) / math.expm1(GRADE) / circles * math.pi / around
+    return made.reshape(-1, 3), angle.ravel()
+
+
+def _circle_angles(theta: float, w: F64, circles: int, around: int) -> F64:
+    """dω that `_circles` has about directions w (P, 3)."""
+    mirror, up, aside = _mirror_frame(theta)
+    away = 2 * np.arcsin(np.minimum(np.linalg.norm(w - mirror, axis=1) / 2, 1.0))
+    f = np.arctan2(w @ aside, w @ up)
+    end = np.arctan2(math.cos(theta), -math.sin(theta) * np.cos(f))
+    grown = np.minimum(away / end, 1.0) * math.expm1(GRADE) + 1
+    made: F64 = np.sin(away) * end * GRADE * grown / math.expm1(GRADE) / circles * math.pi / around
+    return made
+
+
+def _mirror_frame(theta: float) -> tuple[F64, F64, F64]:
+    s, c = math.sin(theta), math.cos(theta)
+    return np.array([-s, 0.0, c]), np.array([c, 0.0, s]), np.array([0.0, 1.0, 0.0])
+
+
+def _look(theta: float, azimuths: Any, heights: int, columns: int, circles: int, around: int) -> _Look:
+    """From (sin θ, 0, cos θ); the grid's azimuths, `columns` a bin, are equally far apart."""
+    step, turn = math.pi / 2 / (RINGS * heights), float(azimuths[1] - azimuths[0])
+    t, p = np.meshgrid((np.arange(RINGS * heights) + 0.5) * step, azimuths, indexing="ij")
+    regular = np.stack([np.sin(t) * np.cos(p), np.sin(t) * np.sin(p), np.cos(t)], -1).reshape(-1, 3)
+    round_, own = _circles(theta, circles, around)
+    if len(azimuths) * turn > 1.5 * math.pi:  # all around
+        round_, own = np.concatenate([round_, round_ * [1, -1, 1]]), np.tile(own, 2)
+    w = np.concatenate([regular, round_])
+    by_circles = np.maximum(_circle_angles(theta, w, circles, around), 1e-300)
+    ratio = (
+        np.minimum(step * turn / by_circles, 1e100) ** 2
+    )  # the grid is no denser at the pole than its rings
+    share = np.where(np.arange(len(w)) < len(regular), 1 / (1 + ratio), ratio / (1 + ratio))
+    weights = np.concatenate([np.sin(t).ravel() * step * turn, own]) * share * np.maximum(w[:, 2], 0.0)
+    count = len(azimuths) // columns
+    shape = (RINGS, heights, count, columns)
+    grid, others = weights[: len(regular)].reshape(shape), weights[len(regular) :]
+    ring = np.minimum(
+        (np.arccos(np.clip(round_[:, 2], 0, 1)) * (RINGS * 2 / math.pi)).astype(np.int64), RINGS - 1
+    )
+    since = np.arctan2(round_[:, 1], round_[:, 0]) - (azimuths[0] - turn / 2)
+    place = np.floor(since / (turn * columns)).astype(np.int64)
+    bins = ring * count + (place % count if columns > 1 else np.clip(place, 0, count - 1))
+    measures = np.repeat(ring_measures()[:, None] * (turn * columns / (2 * math.pi)), count, axis=1)
+    missing = (
+        measures
+        - grid.sum(axis=(1, 3))
+        - np.bincount(bins, others, minlength=measures.size).reshape(-1, count)
+    )
+    return _Look(w.astype(np.float32), grid, others, bins, missing)
+
+
+@functools.cache
+def _half_looks() -> tuple[tuple[float, float, _Look], ...]:
+    """Angle, weight within its ring, and what is looked at: bins are half parts of half a turn, 0 to π."""
+    found = []
+    azimuths = (np.arange(PARTS) + 0.5) * (math.pi / PARTS)
+    for ring in range(RINGS):
+        angles = (ring + (np.arange(VIEWS) + 0.5) / VIEWS) * (math.pi / 2 / RINGS)
+        weights = np.sin(angles) * np.cos(angles)
+        for theta, weight in zip(angles.tolist(), (weights / weights.sum()).tolist(), strict=True):
+            found.append((theta, weight, _look(theta, azimuths, HEIGHTS, 1, CIRCLES, AROUND)))
+    return tuple(found)
+
+
+def ring_means(kernel: Kernel, terms: Sequence[int]) -> F64:
+    """(T, RINGS of wo, RINGS of wi, PARTS of turn between them) of terms that turn with the normal."""
+    made = np.zeros((len(terms), RINGS, RINGS, PARTS))
+    for row, (theta, weight, look) in enumerate(_half_looks()):
+        wo = np.array([math.sin(theta), 0.0, math.cos(theta)], np.float32)
+        values = kernel(wo, look.directions)
+        for number, term in enumerate(terms):
+            made[number, row // VIEWS] += weight * look.sums(values[:, term])
+    half = made / (ring_measures() / (2 * PARTS))[:, None]
+    whole = np.concatenate([half, half[..., ::-1]], axis=3)  # half parts of a whole turn, from 0 on
+    # two cells that lie j parts apart, each as wide as a part: a triangle over the turn between them
+    own = (whole[..., ::2], np.roll(whole, 1, -1)[..., ::2])
+    next_ = (np.roll(whole, -1, -1)[..., ::2], np.roll(whole, 2, -1)[..., ::2])
+    means: F64 = 0.375 * (own[0] + own[1]) + 0.125 * (next_[0] + next_[1])
+    return means
+
+
+@functools.cache
+def _whole_looks() -> tuple[tuple[float, _Look], ...]:
+    """An angle in each ring, and what is looked at all around: bins are cells, azimuths from wo's on.
+
+    They are half a part off, so that wo in the middle of part 0 sees its own part in the middle.
+    """
+    azimuths = (np.arange(2 * PARTS) - 0.5) * (math.pi / PARTS)
+    angles = ((np.arange(RINGS) + 0.5) * (math.pi / 2 / RINGS)).tolist()
+    return tuple((theta, _look(theta, azimuths, 2, 2, WIDE_CIRCLES, WIDE_AROUND)) for theta in angles)
+
+
+def cell_means(kernel: Kernel, terms: Sequence[int], flips: tuple[bool, bool]) -> F32:
+    """(T, CELLS of wo, CELLS of wi) of terms that may have a direction of their own."""
+    made = np.empty((len(terms), RINGS, PARTS, RINGS, PARTS), np.float32)
+    parts = range(PARTS // 4) if all(flips) else range(HALF) if any(flips) else range(PARTS)
+    if flips == (True, False):  # mirrored in x: the half from −π/2 to π/2
+        parts = range(-PARTS // 4, PARTS // 4)
+    for ring, (theta, look) in enumerate(_whole_looks()):
+        for part in parts:
+            turn = (part + 0.5) * (2 * math.pi / PARTS)
+            w = _turned(look.directions, turn)
+            wo = np.array(
+                [math.cos(turn) * math.sin(theta), math.sin(turn) * math.sin(theta), math.cos(theta)]
+            )
+            values = kernel(wo, w)
+            for number, term in enumerate(terms):
+                made[number, ring, part] = np.roll(look.sums(values[:, term]), part, axis=1)
+    every = np.arange(PARTS)
+    across, along = (HALF - 1 - every) % PARTS, (PARTS - 1 - every) % PARTS  # where mirroring leads to
+    if flips[0]:
+        target = every[: PARTS // 4] if flips[1] else np.arange(-PARTS // 4, PARTS // 4) % PARTS
+        made[:, :, across[target]] = made[:, :, target][..., across]
+    if flips[1]:
+        made[:, :, along[:HALF]] = made[:, :, :HALF][..., along]
+    flat = made.reshape(len(terms), CELLS, CELLS)
+    flat /= cell_projected_angles()
+    return flat
+
+
+__all__ = ["Kernel", "Traits", "cell_means", "ring_means", "ring_measures", "traits"]
