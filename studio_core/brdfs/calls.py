@@ -28,7 +28,7 @@ def evaluate(brdf: Brdf, shape: F32, wo: npt.ArrayLike, wi: npt.ArrayLike) -> F3
 
 
 def evaluate_at(address: int, terms: int, shape: F32, wo: npt.ArrayLike, wi: npt.ArrayLike) -> F32:
-    """`evaluate` of a model of which the address alone is known, as in `studio_core.shading.artifacts.Shapes`."""
+    """`evaluate` where the model's address alone is known, as in `studio_core.shading.artifacts.Shapes`."""
     return _values(_EVALUATE(address), terms, shape, wo, wi)
 
 
