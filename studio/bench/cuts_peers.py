@@ -95,7 +95,7 @@ def peer(state: State, program: Headless, samples: Sequence[int], converged: int
         for half in (0, 1):
             kept = cache.get(METHOD, *key, half)
             if kept is None:
-                made = _converged(renderer, converged, half)
+                made = converged_half(renderer, converged, half)
                 cache.put({"linear": made}, METHOD, *key, half)
             else:
                 made = kept["linear"]
@@ -111,7 +111,8 @@ def peer(state: State, program: Headless, samples: Sequence[int], converged: int
     return Peer(tuple(seconds), tuple(errors), (halves[0], halves[1]))
 
 
-def _converged(renderer: object, samples: int, half: int) -> F32:
+def converged_half(renderer: object, samples: int, half: int) -> F32:
+    """(H, W, 3) mean of many pictures, of other random numbers than the other half's."""
     total: npt.NDArray[np.float64] | None = None
     calls = -(-samples // BATCH)
     for call in range(calls):

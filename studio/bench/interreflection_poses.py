@@ -23,6 +23,7 @@ FLAT = 0.03  # metres: lower things are walked on
 GAP = 1e-3  # metres between things that touch
 CONTACT = 0.35  # share of things that are pushed until they touch
 TRIES = 200
+PARALLEL = 1e-12
 
 
 def poses(setting: Setting, count: int = 20, seed: int = 7) -> list[Scene]:
@@ -50,12 +51,13 @@ def room_to_go(moved: F64, still: F64, way: F64) -> float:
     difference = (still[:, None] - moved[None]).reshape(-1, 2)
     sides = ConvexHull(difference).equations
     slope, level = sides[:, :2] @ way, sides[:, 2]
+    towards, away = slope < -PARALLEL, slope > PARALLEL
     if (level <= 0).all():
         return 0.0
-    if ((slope >= 0) & (level > 0)).any():
+    if (~towards & (level > 0)).any():
         return math.inf
-    enter = (level[slope < 0] / -slope[slope < 0]).max()
-    leave = (level[slope > 0] / -slope[slope > 0]).min(initial=math.inf)
+    enter = (level[towards] / -slope[towards]).max()
+    leave = (level[away] / -slope[away]).min(initial=math.inf)
     return float(enter) if enter < leave else math.inf
 
 

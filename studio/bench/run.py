@@ -18,6 +18,7 @@ SUITES = {
         "photograph": "studio.bench.photograph",
         "capture": "studio.bench.capture",
         "materials": "studio.bench.materials",
+        "interreflection": "studio.bench.interreflection",
     },
     "stress": {"ui": "studio.bench.stress_ui"},
 }

@@ -7,27 +7,35 @@ import numpy.typing as npt
 
 from studio_core.contract import Registry
 from studio_core.scene.nodes import Light, Scene
-from studio_core.shading.artifacts import Radiance
+from studio_core.shading.artifacts import Radiance, Surfaces
 from studio_core.shading.materials import coefficients, resolve
 
 
 def vertex_radiance(scene: Scene, radiance: Radiance, registry: Registry) -> npt.NDArray[np.float32]:
     """(V, 3) towards the view, with gains; textures are read at the vertices."""
     lights = {light.id: light for light in scene.of(Light) if scene.shown(light.id)}
-    terms, mesh = radiance.combined(lights), radiance.surfaces.mesh
-    made = np.zeros((len(terms), 3), np.float32)
-    for index, material in enumerate(radiance.surfaces.materials):
+    weights = vertex_weights(scene, radiance.surfaces, radiance.width, registry)
+    made: npt.NDArray[np.float32] = np.einsum("vtc,vtc->vc", radiance.combined(lights), weights)
+    return np.maximum(made, 0)  # captured ones go below 0
+
+
+def vertex_weights(
+    scene: Scene, surfaces: Surfaces, width: int, registry: Registry
+) -> npt.NDArray[np.float32]:
+    """(V, width, 3) what light sums are multiplied with; textures are read at the vertices."""
+    mesh = surfaces.mesh
+    made = np.zeros((len(mesh), width, 3), np.float32)
+    for index, material in enumerate(surfaces.materials):
         own = np.flatnonzero(mesh.material == index)
         if not len(own):
             continue
         resolved = resolve(scene.material(material), registry)
-        table = coefficients(resolved, radiance.width)
+        table = coefficients(resolved, width)
         if table.ndim == 2:
-            weights = np.broadcast_to(table, (len(own), *table.shape))
+            made[own] = table
         else:
             texture = next(iter(resolved.textures.values()))
-            weights = _bilinear(table, texture.placed(mesh.uvs[own]))
-        made[own] = np.maximum((terms[own] * weights).sum(axis=1), 0)  # captured ones go below 0
+            made[own] = _bilinear(table, texture.placed(mesh.uvs[own]))
     return made
 
 

@@ -95,11 +95,17 @@ class DirectRenderer:
     """An exported folder in Mitsuba's own `direct` integrator, loaded once: to time it at its best.
 
     `size` is (width, height); `sampler` one of Mitsuba's, such as `multijitter` (best with square numbers
-    of samples).
+    of samples). With `max_depth` it is its `path` integrator, and lights themselves are not seen.
     """
 
     def __init__(
-        self, folder: Path, size: tuple[int, int], sampler: str = "multijitter", variant: str | None = None
+        self,
+        folder: Path,
+        size: tuple[int, int],
+        sampler: str = "multijitter",
+        variant: str | None = None,
+        *,
+        max_depth: int | None = None,
     ) -> None:
         self._mi = mitsuba(variant)
         self._scene = load(folder, variant, width=size[0], height=size[1], sampler=sampler)
@@ -107,7 +113,9 @@ class DirectRenderer:
             "integrator/boolean[@name='hide_emitters']"
         )
         hide = hidden is not None and hidden.get("value") == "true"
-        self._integrator = self._mi.load_dict({"type": "direct", "hide_emitters": hide})
+        direct = {"type": "direct", "hide_emitters": hide}
+        path = {"type": "path", "hide_emitters": True, "max_depth": max_depth}
+        self._integrator = self._mi.load_dict(direct if max_depth is None else path)
 
     def __call__(self, spp: int, seed: int = 0, sensor: int = 0) -> F32:
         """(H, W, 3) linear radiance."""
