@@ -1,4 +1,4 @@
-"""The brute-force backend that every other one is compared with."""
+"""The brute-force backend and the path tracing that every other method is compared with."""
 
 from studio_core.contract import API, Plugin
 
@@ -6,5 +6,8 @@ plugin = Plugin(
     id="reference",
     label="Reference",
     api=API,
-    provides={"backend": {"reference": "studio_plugins.reference.backend:BACKEND"}},
+    provides={
+        "backend": {"reference": "studio_plugins.reference.backend:BACKEND"},
+        "indirect": {"paths": "studio_plugins.reference.paths:METHOD"},
+    },
 )
