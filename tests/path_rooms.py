@@ -16,9 +16,10 @@ from studio_core.scene.transform import Transform, axis_angle
 from studio_core.shading.artifacts import Casters, Hits, Lighting, Shapes, Surfaces
 from studio_core.shading.frame import Frame
 from studio_core.shading.job import Job
-from studio_core.shading.offline import backend_params, scene_view
+from studio_core.shading.offline import scene_view
 from studio_core.shading.path_world import PathWorld, PathWorlds
 from studio_core.shading.pipeline import Pipeline
+from studio_core.shading.stages import SurfaceParams, common_stages
 
 
 @dataclass(frozen=True)
@@ -38,10 +39,8 @@ class Stand:
 
 def stand(scene: Scene, services: Any, vertices: int = 1500) -> Stand:
     """Of a scene, seen by its first camera or by one that sees everything."""
-    backend = services.registry.get("backend", "reference")
-    pipeline = Pipeline(backend.stages(services)[:5])
-    view = scene_view(scene, None, 48, 27)
-    frame = Frame(scene, view, backend_params(backend, {"vertices": vertices, "directions": "1024"}), 1)
+    pipeline = Pipeline(common_stages(services))
+    frame = Frame(scene, scene_view(scene, None, 48, 27), SurfaceParams(vertices), 1)
     pipeline.update(frame, Changes(), Job("stand"))
     found: list[Any] = [pipeline.artifact(kind) for kind in (Surfaces, Casters, Lighting, Shapes, Hits)]
     surfaces, casters, lighting, shapes, hits = found
