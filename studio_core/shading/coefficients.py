@@ -119,24 +119,24 @@ class CoefficientTable:
         resolved = resolve(bare, self._registry)  # what catches shadows shows no picture of its own
         if not resolved.textures:
             plain = coefficients(resolved).ravel()
-            none, where = np.zeros_like(plain), _uv_map(resolved)
+            none, where = np.zeros_like(plain), uv_map_of(resolved)
             return _Look(material, CONSTANT, plain, none, plain, None, None, where)
         if len(resolved.textures) == 1:
-            key = _picture_key(resolved)
+            key = picture_key(resolved)
             found = pictures.get(key) or self._pictures.get(key)
             if found is None:
-                found = _picture(next(iter(resolved.textures.values())).image, key[1])
-            line = _line(resolved, found)
+                found = pyramid(picture_texels(next(iter(resolved.textures.values())).image, key[1]))
+            line = affine_line(resolved, found)
             if line is not None:
                 pictures[key] = found
                 plain, slope = line
                 mean = np.tile(found.levels[-1].mean(axis=(0, 1), dtype=np.float32), len(plain) // 3)
                 typical = plain + slope * mean
-                return _Look(material, AFFINE, plain, slope, typical, found, key, _uv_map(resolved))
+                return _Look(material, AFFINE, plain, slope, typical, found, key, uv_map_of(resolved))
         own = pyramid(coefficients(resolved).reshape(*_map_size(resolved), -1))
         typical = own.levels[-1].mean(axis=(0, 1), dtype=np.float32)
         none = np.zeros_like(typical)
-        return _Look(material, GENERAL, none, none, typical, own, None, _uv_map(resolved))
+        return _Look(material, GENERAL, none, none, typical, own, None, uv_map_of(resolved))
 
     def _assemble(self, looks: tuple[_Look, ...]) -> Coefficients:
         count = max(len(looks), 1)
@@ -181,15 +181,16 @@ def _same(a: Maps, b: Maps) -> bool:
     return all(np.array_equal(x, y) for x, y in pairs)
 
 
-def _picture_key(resolved: Resolved) -> tuple[str, bool]:
+def picture_key(resolved: Resolved) -> tuple[str, bool]:
     """What picture a material with one texture shows: its content, and whether one channel stands for all."""
     ((name, texture),) = resolved.textures.items()
     return texture.image.key, np.ndim(np.asarray(resolved.values[name])) == 0
 
 
-def _picture(image: Image, grey: bool) -> Pyramid:
+def picture_texels(image: Image, grey: bool) -> F32:
+    """(H, W, 3) what a material with one texture multiplies, rows from v = 0 up."""
     texels = linear_rgb(image)[::-1]
-    return pyramid(np.repeat(texels[..., :1], 3, axis=2) if grey else texels)
+    return np.repeat(texels[..., :1], 3, axis=2) if grey else texels
 
 
 def _map_size(resolved: Resolved) -> tuple[int, int]:
@@ -197,13 +198,14 @@ def _map_size(resolved: Resolved) -> tuple[int, int]:
     return max(h for h, _ in sizes), max(w for _, w in sizes)
 
 
-def _uv_map(resolved: Resolved) -> F32:
+def uv_map_of(resolved: Resolved) -> F32:
+    """(6,) `Texture.affine` of the pictures, which all lie alike."""
     for texture in resolved.textures.values():
         return np.array(texture.affine, np.float32)
     return np.array([1, 0, 0, 0, 1, 0], np.float32)
 
 
-def _line(resolved: Resolved, picture: Pyramid) -> tuple[F32, F32] | None:
+def affine_line(resolved: Resolved, picture: Pyramid) -> tuple[F32, F32] | None:
     """Coefficients (T·3,) at texel 0 and their slopes, channel by channel; None where they bend."""
     low, high = picture.low.astype(np.float64), picture.high.astype(np.float64)
     ramp = np.linspace(0, 1, PROBES)[:, None]
