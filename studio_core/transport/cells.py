@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from studio_core.jit import kernel
+from studio_core.kernels.directions import arctangent
 
 F32 = npt.NDArray[np.float32]
 
@@ -25,11 +26,22 @@ _PER_TURN = PARTS / (2 * math.pi)
 @kernel
 def cell_of(x: float, y: float, z: float) -> int:
     """The cell of a unit direction in the surface's frame (z is the normal); of z ≤ 0 the nearest one."""
-    ring = min(int(math.acos(min(max(z, 0.0), 1.0)) * _PER_RADIAN), RINGS - 1)
-    turn = math.atan2(y, x) * _PER_TURN
-    if turn < 0.0:
-        turn += PARTS
-    return ring * PARTS + min(int(turn), PARTS - 1)
+    across, up = np.sqrt(x * x + y * y), max(z, 0.0)
+    ring = min(int(_angle(across, up) * _PER_RADIAN), RINGS - 1)
+    turn = _angle(abs(y), abs(x))
+    if x < 0.0:
+        turn = math.pi - turn
+    if y < 0.0:
+        turn = 2.0 * math.pi - turn
+    return ring * PARTS + min(int(turn * _PER_TURN), PARTS - 1)
+
+
+@kernel
+def _angle(y: float, x: float) -> float:
+    """atan2(y, x) for y, x ≥ 0 within 1e-7."""
+    larger = max(x, y, 1e-30)
+    made = float(arctangent(np.float32(min(x, y) / larger)))
+    return math.pi / 2 - made if y > x else made
 
 
 @functools.cache

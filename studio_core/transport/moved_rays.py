@@ -29,8 +29,6 @@ _ROOM = np.float32(1.001)
 
 @kernel
 def ask(
-    row: int,
-    column: int,
     local: bool,
     centre: F64,
     radius: float,
@@ -42,7 +40,7 @@ def ask(
     word: U32,
     marks: U8,
 ) -> int:
-    """Marks the rays that pass a sphere before they end; how many."""
+    """Marks the rays (N,) of a row that pass a sphere before they end; how many."""
     wx, wy, wz = centre[0] - origin[0], centre[1] - origin[1], centre[2] - origin[2]
     x = np.float32(axes[0, 0] * wx + axes[0, 1] * wy + axes[0, 2] * wz)
     y = np.float32(axes[1, 0] * wx + axes[1, 1] * wy + axes[1, 2] * wz)
@@ -52,16 +50,16 @@ def ask(
     outside = np.float32(wx * wx + wy * wy + wz * wz - radius * radius)
     found = 0
     for ray in range(len(directions)):
-        if marks[ray, column] != KEEP:
+        if marks[ray] != KEEP:
             continue
         along = directions[ray, 0] * x + directions[ray, 1] * y + directions[ray, 2] * z
         depth = along * along - outside
         if outside > 0 and (depth < 0 or along < 0):
             continue
-        reach = half_value(distance[row, ray], word) * _ROOM + np.float32(epsilon)
+        reach = half_value(distance[ray], word) * _ROOM + np.float32(epsilon)
         if outside > 0 and along > reach and (along - reach) * (along - reach) > depth:
             continue
-        marks[ray, column] = ASK
+        marks[ray] = ASK
         found += 1
     return found
 
@@ -95,29 +93,30 @@ def answer(
             o = origin[column]
             starts[column, axis] = m[0] * o[0] + m[1] * o[1] + m[2] * o[2] + m[3]
     used = 0
-    for item in range(rays * count + 1):
-        if item < rays * count:
-            ray, column = item // count, item % count
-            if marks[ray, column] != ASK:
-                continue
-            row = which[first + column]
-            d = directions[variant[row], ray]
-            t = axes[column]
-            dx = t[0, 0] * d[0] + t[1, 0] * d[1] + t[2, 0] * d[2]
-            dy = t[0, 1] * d[0] + t[1, 1] * d[1] + t[2, 1] * d[2]
-            dz = t[0, 2] * d[0] + t[1, 2] * d[1] + t[2, 2] * d[2]
-            for axis in range(3):
-                m = from_mesh[axis]
-                packet[ORIGIN + axis, used] = starts[column, axis]
-                packet[DIRECTION + axis, used] = m[0] * dx + m[1] * dy + m[2] * dz
-            packet[TFAR, used] = half_value(distance[row, ray], word) * _ROOM + np.float32(epsilon)
-            valid[used] = -1
-            column_of[used], ray_of[used] = column, ray
-            used += 1
-        if used == 8 or (item == rays * count and used > 0):
-            for lane in range(used, 8):
-                valid[lane] = 0
-            call_address(occluded8, valid, scene, packet, 0)
-            for lane in range(used):
-                marks[ray_of[lane], column_of[lane]] = TRACE if packet[TFAR, lane] < 0 else KEEP
-            used = 0
+    for column in range(count + 1):
+        last = column == count
+        for ray in range(1 if last else rays):
+            if not last:
+                if marks[column, ray] != ASK:
+                    continue
+                row = which[first + column]
+                d = directions[variant[row], ray]
+                t = axes[column]
+                dx = t[0, 0] * d[0] + t[1, 0] * d[1] + t[2, 0] * d[2]
+                dy = t[0, 1] * d[0] + t[1, 1] * d[1] + t[2, 1] * d[2]
+                dz = t[0, 2] * d[0] + t[1, 2] * d[1] + t[2, 2] * d[2]
+                for axis in range(3):
+                    m = from_mesh[axis]
+                    packet[ORIGIN + axis, used] = starts[column, axis]
+                    packet[DIRECTION + axis, used] = m[0] * dx + m[1] * dy + m[2] * dz
+                packet[TFAR, used] = half_value(distance[row, ray], word) * _ROOM + np.float32(epsilon)
+                valid[used] = -1
+                column_of[used], ray_of[used] = column, ray
+                used += 1
+            if used == 8 or (last and used > 0):
+                for lane in range(used, 8):
+                    valid[lane] = 0
+                call_address(occluded8, valid, scene, packet, 0)
+                for lane in range(used):
+                    marks[column_of[lane], ray_of[lane]] = TRACE if packet[TFAR, lane] < 0 else KEEP
+                used = 0

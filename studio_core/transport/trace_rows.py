@@ -89,6 +89,66 @@ def _prepare(
 
 
 @kernel
+def _settle(
+    used: int,
+    row_of: I64,
+    ray_of: I64,
+    along: F64,
+    packet: F32,
+    valid: I32,
+    stream: I64,
+    face_start: I64,
+    face_ids: I32,
+    turns: F32,
+    face_offsets: I64,
+    faces: U32,
+    back_faces: U32,
+    normals: F32,
+    tangents: F32,
+    word: U32,
+    vertex: U32,
+    cell: U16,
+    distance: U16,
+    touched: npt.NDArray[np.bool_],
+) -> None:
+    """Writes what the rays of a packet met."""
+    words = packet.view(np.uint32)
+    for lane in range(used):
+        row, ray = row_of[lane], ray_of[lane]
+        met, seen, far = np.int64(NOTHING), 0, _far()
+        if valid[lane] != 0 and words[GEOMETRY, lane] != NO_HIT:
+            thing = np.int64(words[INSTANCE, lane])
+            slot = face_start[thing, np.int64(words[GEOMETRY, lane])] + np.int64(words[PRIMITIVE, lane])
+            face = face_offsets[thing] + face_ids[slot]
+            dx, dy, dz = along[lane, 0], along[lane, 1], along[lane, 2]
+            m = turns[thing]
+            # the sign of the world's normal along the ray: Ng · (Mᵀ d)
+            facing = np.float64(packet[NORMAL, lane]) * (m[0, 0] * dx + m[1, 0] * dy + m[2, 0] * dz)
+            facing += np.float64(packet[NORMAL + 1, lane]) * (m[0, 1] * dx + m[1, 1] * dy + m[2, 1] * dz)
+            facing += np.float64(packet[NORMAL + 2, lane]) * (m[0, 2] * dx + m[1, 2] * dy + m[2, 2] * dz)
+            u, v = packet[U, lane], packet[V, lane]
+            number = chance(stream[row], ray)
+            corner = 1 if number < u else (2 if number < u + v else 0)
+            met = np.int64(faces[face, corner] if facing < 0 else back_faces[face, corner])
+            far = packet[TFAR, lane]
+            if met == NO_BACK:
+                met, seen = np.int64(BLACK), int(thing) if thing < NO_OBJECT else NO_OBJECT
+            else:
+                nx, ny, nz = normals[met, 0], normals[met, 1], normals[met, 2]
+                tx, ty, tz = tangents[met, 0], tangents[met, 1], tangents[met, 2]
+                sense = -tangents[met, 3]
+                seen = cell_of(
+                    -(tx * dx + ty * dy + tz * dz),
+                    sense * ((ny * tz - nz * ty) * dx + (nz * tx - nx * tz) * dy + (nx * ty - ny * tx) * dz),
+                    -(nx * dx + ny * dy + nz * dz),
+                )
+        if vertex[row, ray] != met or cell[row, ray] != seen:
+            touched[row] = True
+            vertex[row, ray], cell[row, ray] = met, seen
+        distance[row, ray] = half_bits(far, word)
+
+
+@kernel
 def _follow(
     intersect8: int,
     scene: int,
@@ -119,71 +179,58 @@ def _follow(
     touched: npt.NDArray[np.bool_],
 ) -> int:
     """Traces the marked rays and writes what they meet; how many."""
-    words = packet.view(np.uint32)
     rays = directions.shape[1]
     row_of, ray_of = np.empty(8, np.int64), np.empty(8, np.int64)
     along = np.empty((8, 3))
-    frame = np.empty((3, 3))
     used, traced = 0, 0
-    for item in range(rays * count + 1):
-        if item < rays * count:
-            ray, column = item // count, item % count
-            if marks[ray, column] != TRACE:
-                continue
-            row = which[first + column]
-            d = directions[variant[row], ray]
-            t = axes[column]
-            size = 0.0
-            for axis in range(3):
-                along[used, axis] = t[0, axis] * d[0] + t[1, axis] * d[1] + t[2, axis] * d[2]
-                size += abs(along[used, axis])
-                packet[ORIGIN + axis, used] = origin[column, axis] + shift[axis]
-                packet[DIRECTION + axis, used] = along[used, axis]
-            packet[TFAR, used] = np.inf
-            valid[used] = -1 if 0.0 < size < np.inf else 0
-            traced += 1
-            row_of[used], ray_of[used] = row, ray
-            used += 1
-        if used == 8 or (item == rays * count and used > 0):
-            for lane in range(used, 8):
-                valid[lane] = 0
-            clear_hits(packet)
-            call_address(intersect8, valid, scene, packet, 0)
-            for lane in range(used):
-                met, seen, far = np.int64(NOTHING), 0, _far()
-                if valid[lane] != 0 and words[GEOMETRY, lane] != NO_HIT:
-                    thing = np.int64(words[INSTANCE, lane])
-                    slot = face_start[thing, np.int64(words[GEOMETRY, lane])] + np.int64(
-                        words[PRIMITIVE, lane]
-                    )
-                    face = face_offsets[thing] + face_ids[slot]
-                    x, y, z = packet[NORMAL, lane], packet[NORMAL + 1, lane], packet[NORMAL + 2, lane]
-                    facing = 0.0
-                    for axis in range(3):
-                        m = turns[thing, axis]
-                        n = np.float64(m[0]) * x + np.float64(m[1]) * y + np.float64(m[2]) * z
-                        facing += n * along[lane, axis]
-                    u, v = packet[U, lane], packet[V, lane]
-                    number = chance(stream[row_of[lane]], ray_of[lane])
-                    corner = 1 if number < u else (2 if number < u + v else 0)
-                    met = np.int64(faces[face, corner] if facing < 0 else back_faces[face, corner])
-                    far = packet[TFAR, lane]
-                    if met == NO_BACK:
-                        met, seen = np.int64(BLACK), int(thing) if thing < NO_OBJECT else NO_OBJECT
-                    else:
-                        surface_frame(normals[met], tangents[met], frame)
-                        a, b, c = -along[lane, 0], -along[lane, 1], -along[lane, 2]
-                        seen = cell_of(
-                            frame[0, 0] * a + frame[0, 1] * b + frame[0, 2] * c,
-                            frame[1, 0] * a + frame[1, 1] * b + frame[1, 2] * c,
-                            frame[2, 0] * a + frame[2, 1] * b + frame[2, 2] * c,
-                        )
-                row, ray = row_of[lane], ray_of[lane]
-                if vertex[row, ray] != met or cell[row, ray] != seen:
-                    touched[row] = True
-                vertex[row, ray], cell[row, ray] = met, seen
-                distance[row, ray] = half_bits(far, word)
-            used = 0
+    for column in range(count + 1):
+        last = column == count
+        for ray in range(1 if last else rays):
+            if not last:
+                if marks[column, ray] != TRACE:
+                    continue
+                row = which[first + column]
+                d = directions[variant[row], ray]
+                t = axes[column]
+                size = 0.0
+                for axis in range(3):
+                    along[used, axis] = t[0, axis] * d[0] + t[1, axis] * d[1] + t[2, axis] * d[2]
+                    size += abs(along[used, axis])
+                    packet[ORIGIN + axis, used] = origin[column, axis] + shift[axis]
+                    packet[DIRECTION + axis, used] = along[used, axis]
+                packet[TFAR, used] = np.inf
+                valid[used] = -1 if 0.0 < size < np.inf else 0
+                row_of[used], ray_of[used] = row, ray
+                used += 1
+                traced += 1
+            if used == 8 or (last and used > 0):
+                for lane in range(used, 8):
+                    valid[lane] = 0
+                clear_hits(packet)
+                call_address(intersect8, valid, scene, packet, 0)
+                _settle(
+                    used,
+                    row_of,
+                    ray_of,
+                    along,
+                    packet,
+                    valid,
+                    stream,
+                    face_start,
+                    face_ids,
+                    turns,
+                    face_offsets,
+                    faces,
+                    back_faces,
+                    normals,
+                    tangents,
+                    word,
+                    vertex,
+                    cell,
+                    distance,
+                    touched,
+                )
+                used = 0
     return traced
 
 
@@ -251,7 +298,7 @@ def update_rows(
     packet, valid = new_packet()
     packet.view(np.uint32)[MASK, :] = OPAQUE
     word = np.zeros(1, np.uint32)
-    marks = np.zeros((rays, count), np.uint8)
+    marks = np.zeros((count, rays), np.uint8)
     axes, origin = np.empty((count, 3, 3)), np.empty((count, 3))
     good = np.empty(count, np.bool_)
     marked = np.zeros(count, np.bool_)
@@ -291,7 +338,7 @@ def update_rows(
                 )
             continue
         if whole[s] or moved_here[thing_of[receiver[row]]]:
-            marks[:, column] = TRACE
+            marks[column] = TRACE
             marked[column] = True
         elif things_seen[row] & bits != np.uint64(0):
             for ray in range(rays):
@@ -300,7 +347,7 @@ def update_rows(
                     continue
                 thing = np.int64(cell[row, ray]) if met == BLACK else np.int64(thing_of[met])
                 if thing >= NO_OBJECT or moved_here[thing]:
-                    marks[ray, column] = TRACE
+                    marks[column, ray] = TRACE
                     marked[column] = True
     for other in range(len(part_scene)):
         if not pending[other] or part_scene[other] == 0:
@@ -314,8 +361,6 @@ def update_rows(
             for k in range(moved_start[s], moved_start[s + 1]):
                 if moved_items[k] == other:
                     asked = ask(
-                        row,
-                        column,
                         local,
                         centre[other],
                         radius[other],
@@ -323,9 +368,9 @@ def update_rows(
                         axes[column],
                         origin[column],
                         directions[variant[row]],
-                        distance,
+                        distance[row],
                         word,
-                        marks,
+                        marks[column],
                     )
                     found += asked
                     if asked > 0:
