@@ -28,7 +28,7 @@ from studio_core.registry import PluginHost
 from studio_core.session import Session
 from studio_core.shading.artifacts import MeasuredError
 from studio_core.shading.cache import DiskCache
-from studio_core.shading.frame import Frame
+from studio_core.shading.frame import Frame, IndirectChoice
 from studio_core.shading.job import Job
 from studio_core.shading.pipeline import Pipeline
 from studio_core.shading.scheduler import ComputeThread, Executor
@@ -78,6 +78,13 @@ class PluginShading:
     def params(self, backend: str, values: Mapping[str, Any]) -> Any:
         """The backend's parameters, checked."""
         return build(self._services.registry.get("backend", backend).Params, values)
+
+    def indirect(self, choice: IndirectChoice) -> IndirectChoice | None:
+        """The choice with its parameters, checked."""
+        if choice.method not in self._services.registry.names("indirect"):
+            return None  # of a plugin that is not there
+        method = self._services.registry.get("indirect", choice.method)
+        return IndirectChoice(choice.method, build(method.Params, choice.params))
 
 
 @dataclass
@@ -215,7 +222,7 @@ def _warm(context: Context, compute: Executor, files: Executor, bridge: Bridge) 
         context.warmed.emit()
 
     def load() -> None:
-        for kind in ("brdf", "backend"):
+        for kind in ("brdf", "backend", "indirect"):
             host.available(kind)
         bridge.post(warmed)
 

@@ -197,10 +197,13 @@ def parser() -> argparse.ArgumentParser:
         one.add_argument("--threads", type=_threads, metavar="N", help="kernel threads (default: all cores)")
         return one
 
+    from studio import indirect_options
+
     demo = verb("demo", "the sample room in a window, or as a picture where there is no display")
     demo.add_argument("--headless", action="store_true", help="render even where a window could be opened")
     demo.add_argument("-o", "--out", type=Path, metavar="PNG", help="render to this picture")
     _backend_options(demo)
+    indirect_options.add_options(demo)
     _picture_options(demo)
 
     new = verb("new", "make a project from files")
@@ -253,6 +256,7 @@ def parser() -> argparse.ArgumentParser:
     render.add_argument("project", type=Path, metavar="PROJECT")
     render.add_argument("-o", "--out", type=Path, required=True, metavar="OUT.(png|exr)")
     _backend_options(render)
+    indirect_options.add_options(render)
     _picture_options(render)
     render.add_argument("--preview", type=Path, metavar="PNG", help="a small picture of what is there so far")
 
@@ -276,6 +280,7 @@ def parser() -> argparse.ArgumentParser:
     frames.add_argument("--resume", action="store_true", help="keep pictures of that size that are there")
     frames.add_argument("--sheet", type=Path, metavar="PNG", help="all of them, small, on one sheet")
     _backend_options(frames)
+    indirect_options.add_options(frames)
     _picture_options(frames)
 
     radiance = verb("radiance", "radiance and irradiance of every shading vertex as .npz")
@@ -284,6 +289,7 @@ def parser() -> argparse.ArgumentParser:
     radiance.add_argument("--directions", type=int, metavar="S", help="the same as --param directions=S")
     radiance.add_argument("--camera", metavar="NAME", help="towards this camera (default: the first)")
     _backend_options(radiance)
+    indirect_options.add_options(radiance)
 
     precompute = verb("precompute", "make now what a backend keeps on disk for a project")
     precompute.add_argument("project", type=Path, metavar="PROJECT")
@@ -351,13 +357,14 @@ def _backend_options(verb: argparse.ArgumentParser) -> None:
         metavar="KEY=VALUE",
         help="a parameter of the backend, such as directions=4096 or vertices=100000; may be repeated",
     )
-    verb.add_argument("--indirect", metavar="ID", help="a layer of light between surfaces on top")
-    verb.add_argument("--bounces", type=int, metavar="N", help="of the indirect layer")
 
 
 def _picture_options(verb: argparse.ArgumentParser) -> None:
+    from studio import indirect_options
+
     verb.add_argument("--camera", metavar="NAME", help="what this camera sees (default: the first)")
     verb.add_argument("--size", default="960x540", metavar="WxH", help="pixels (default: 960x540)")
+    indirect_options.add_light_option(verb)
     verb.add_argument("--exposure", type=float, default=0.0, metavar="EV", help="of a PNG")
     verb.add_argument(
         "--tonemap", choices=("srgb", "filmic", "raw"), default="srgb", help="tone curve of a PNG"

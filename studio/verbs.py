@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from studio.headless import Headless
+from studio.indirect_options import chosen_indirect
 from studio_core.contract import ShadingBackend
 from studio_core.errors import InputError, ProjectError
 from studio_core.scene.nodes import Light, Scene
@@ -102,10 +103,6 @@ def chosen_backend(
     """Backend and parameters from --backend, --param, --directions."""
     from studio_core.shading.offline import backend_params
 
-    if options.indirect is not None:
-        raise InputError(f"--indirect {options.indirect}: no indirect layer of that name is installed")
-    if options.bounces is not None:
-        raise InputError("--bounces: there is no indirect layer to bounce; name one with --indirect")
     backend: ShadingBackend = program.registry.get("backend", options.backend)
     values: dict[str, object] = dict(extra)
     for text in options.param:
@@ -126,15 +123,18 @@ def radiance(options: argparse.Namespace, program: Headless) -> None:
     check_target(options.out, (".npz",), "vertices")
     extra = {} if options.directions is None else {"directions": str(options.directions)}
     backend, params = chosen_backend(options, program, everywhere=True, **extra)
+    choice = chosen_indirect(options, program)
     scene = open_scene(options.project)
     view = scene_view(scene, options.camera, 320, 180)
     with program.job("Shading") as job:
-        made, pipeline = shaded_pipeline(scene, view, backend, params, program.services, job)
+        given = (scene, view, backend, params, program.services, job)
+        made, pipeline = shaded_pipeline(*given, indirect=choice)
     write_radiance(options.out, scene, made, ray_origins(pipeline, made), program)
     values = {
         "project": str(options.project),
         "out": str(options.out),
         "backend": backend.id,
+        "indirect": choice.method if choice is not None else None,
         "vertices": len(made.valid),
         "directions": made.directions,
     }

@@ -15,10 +15,11 @@ from typing import TYPE_CHECKING, Any
 
 from studio import verbs
 from studio.headless import Headless
+from studio.indirect_options import NONE, check_light, chosen_indirect
 from studio_core.errors import InputError
 from studio_core.scene.nodes import Camera, Light, MeshObject, Scene
 from studio_core.scene.transform import Vec3
-from studio_core.session import View
+from studio_core.session import SHARE, View
 
 if TYPE_CHECKING:
     from studio_core.imaging.preview import ContactSheet
@@ -58,6 +59,7 @@ def check_picture(options: argparse.Namespace, out: Path) -> tuple[int, int]:
         raise InputError(f"--measure {options.measure}: expected 1 to 100000 places")
     if not 0 <= options.dpi <= 1e5:
         raise InputError(f"--dpi {options.dpi:g}: expected dots per inch, up to 100000")
+    check_light(options)
     check_finish(out, finish_of(options), options.lights)
     needed, there = _memory_needed(width, height, options.antialias), memory()
     if needed > there:
@@ -89,7 +91,9 @@ def finish_of(options: argparse.Namespace) -> Any:
     """How light becomes a file."""
     from studio_core.imaging.picture import Finish
 
-    return Finish(options.exposure, options.tonemap, options.bits, options.dpi)
+    false_colours = options.light == SHARE
+    exposure, tonemap = (0.0, "srgb") if false_colours else (options.exposure, options.tonemap)
+    return Finish(exposure, tonemap, options.bits, options.dpi)
 
 
 def _told(options: argparse.Namespace, program: Headless, scene: Scene) -> None:
@@ -103,6 +107,8 @@ def _facts(options: argparse.Namespace, scene: Scene) -> dict[str, str | float |
     """What files say of themselves."""
     camera = next((c for c in scene.of(Camera) if options.camera in (None, c.name, c.id)), None)
     named = {"lucarne:camera": camera.name} if camera is not None else {}
+    if options.indirect != NONE:
+        named |= {"lucarne:indirect": options.indirect, "lucarne:light": options.light}
     return {"ImageDescription": options.project.stem, "lucarne:backend": options.backend, **named}
 
 
@@ -141,10 +147,11 @@ def render(options: argparse.Namespace, program: Headless) -> None:
 
     size = check_picture(options, options.out)
     backend, params = verbs.chosen_backend(options, program)
+    choice = chosen_indirect(options, program)
     scene = verbs.open_scene(options.project)
     _told(options, program, scene)
     view, finish = _viewed(options, scene, size, options.camera), finish_of(options)
-    maker = PictureMaker(backend, params, program.services)
+    maker = PictureMaker(backend, params, program.services, indirect=choice, light=options.light)
     parts = Parts(transparent=options.alpha, lights=options.lights)
     preview = None if options.preview is None else _Preview(options.preview, size, finish)
     with program.job("Rendering") as job:
@@ -171,6 +178,8 @@ def render(options: argparse.Namespace, program: Headless) -> None:
         "finite": made.finite,
         "mean": made.mean if made.finite else None,
         "counts": dict(made.radiance.counts),
+        "indirect": None if choice is None else {"method": choice.method, **_told_by(choice, made.radiance)},
+        "light": options.light,
         "seconds": {"shading": round(made.shading, 3), "composing": round(made.composing, 3)},
     }
     text = f"{options.out}: {size[0]}×{size[1]}, {vertices} vertices"
@@ -178,6 +187,10 @@ def render(options: argparse.Namespace, program: Headless) -> None:
         values["error"] = made.error.as_dict()
         text += f", error {made.error.picture}"
     verbs.result(options, program, values, text)
+
+
+def _told_by(choice: Any, radiance: Any) -> dict[str, object]:
+    return {"params": dataclasses.asdict(choice.params), "facts": dict(radiance.facts)}
 
 
 @dataclass(frozen=True)
@@ -200,6 +213,7 @@ def frames(options: argparse.Namespace, program: Headless) -> None:
         verbs.check_target(options.sheet, (".png",), "contact sheets")
     count = frame_count(options)
     backend, params = verbs.chosen_backend(options, program)
+    choice = chosen_indirect(options, program)
     scene = verbs.open_scene(options.project)
     _told(options, program, scene)
     shots, finish = shots_of(options, scene, size, count), finish_of(options)
@@ -208,7 +222,7 @@ def frames(options: argparse.Namespace, program: Headless) -> None:
         verbs.check_target(path)
     sheet = ContactSheet(count, size)
     there = _kept(paths, size, sheet) if options.resume else set()
-    maker = PictureMaker(backend, params, program.services)
+    maker = PictureMaker(backend, params, program.services, indirect=choice, light=options.light)
     facts, parts = _facts(options, scene), Parts(transparent=options.alpha, lights=options.lights)
     finite, shown, started = True, 0.0, time.perf_counter()
     errors: list[dict[str, object]] = []
@@ -245,6 +259,8 @@ def frames(options: argparse.Namespace, program: Headless) -> None:
         "frames": [str(path) for path in paths],
         "kept": len(there),
         "backend": backend.id,
+        "indirect": choice.method if choice is not None else None,
+        "light": options.light,
         "width": size[0],
         "height": size[1],
         "finite": finite,

@@ -11,6 +11,7 @@ arrives there over what arrived when it was taken.
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
@@ -19,7 +20,9 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from studio_core.colour import LUMINANCE
 from studio_core.contract import Services
+from studio_core.false_colour import linear_colours
 from studio_core.kernels.compose import (
     GENERAL,
     RECORD,
@@ -35,7 +38,7 @@ from studio_core.kernels.tonemap import prepare
 from studio_core.parallel import Workers
 from studio_core.scene.diff import Aspect
 from studio_core.scene.nodes import Light, Scene
-from studio_core.session import View
+from studio_core.session import SHARE, View
 from studio_core.shading.artifacts import (
     Hits,
     Picture,
@@ -61,12 +64,17 @@ I64 = npt.NDArray[np.int64]
 U32 = npt.NDArray[np.uint32]
 
 
+NO_SHARE = 0.035
+"""Grey, linear, of pixels that show no surface."""
+_LUMINANCE = np.array(LUMINANCE, np.float32)
+
+
 class PictureStage:
     """Linear pixels of what the camera sees, from radiance at vertices."""
 
     needs: tuple[type, ...] = (Surfaces, Hits, Radiance)
     gives = Picture
-    dirtied_by = Aspect.MATERIAL | Aspect.GAIN | Aspect.LIGHT | Aspect.VIEW
+    dirtied_by = Aspect.MATERIAL | Aspect.GAIN | Aspect.LIGHT | Aspect.VIEW | Aspect.INDIRECT
 
     def __init__(self, services: Services) -> None:
         self._coefficients = CoefficientTable(services.registry)
@@ -80,7 +88,8 @@ class PictureStage:
         hits = inputs[Hits] if radiance.hits is None else radiance.hits
         self._soundness.check(radiance, hits)  # before kernels index with it
         table = self._coefficients(frame.scene, radiance.surfaces)
-        return self._compositor.picture(frame.scene, radiance, hits, table, job)
+        make = self._compositor.share if frame.light == SHARE else self._compositor.picture
+        return make(frame.scene, radiance, hits, table, job)
 
 
 @dataclass(frozen=True, eq=False)
@@ -162,6 +171,26 @@ class Compositor:
             maps = (table.maps, backdrop, *((None, None) if relief is None else (relief.bend, table.reliefs)))
             colours = VertexColours(tables.record, tables.sums, corners, *maps)
         return Picture(radiance, linear, outline.coverage, outline.node, outline.distance, colours)
+
+    def share(
+        self, scene: Scene, radiance: Radiance, hits: Hits, table: Coefficients, job: Job | None = None
+    ) -> Picture:
+        """The share of light that came by way of other surfaces, of the luminance of each pixel, as colours.
+
+        Nothing is seen behind objects, nor on what shows the photograph behind it.
+        """
+        sky = shown_environment(scene)
+        if sky is not None:
+            scene = scene.with_nodes(dataclasses.replace(sky, background=False))
+        whole = self.picture(scene, radiance, hits, table, job)
+        between = dataclasses.replace(radiance, layers={}, pixel=None)
+        part = self.picture(scene, between, hits, table, job).linear @ _LUMINANCE
+        light = whole.linear @ _LUMINANCE
+        share = np.divide(part, light, out=np.zeros_like(light), where=light > 0)
+        share = np.where(whole.coverage > 0, np.clip(share, 0, 1), np.float32(np.nan))
+        colours = linear_colours(share)
+        colours[np.isnan(share)] = NO_SHARE
+        return dataclasses.replace(whole, linear=colours, colours=None, share=share)
 
     def radiance(
         self,

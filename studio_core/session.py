@@ -15,6 +15,11 @@ from studio_core.scene.nodes import Camera, NodeId, Scene
 from studio_core.scene.transform import IDENTITY, Transform, looking
 from studio_core.signal import Signal
 
+ALL, DIRECT, INDIRECT, SHARE = "all", "direct", "indirect", "share"
+LIGHTS = (ALL, DIRECT, INDIRECT, SHARE)
+"""Which light is looked at: all, what comes straight from lamps and sky, what came by way of other surfaces,
+the share of that."""
+
 
 @dataclass(frozen=True)
 class View:
@@ -80,13 +85,21 @@ def framing(low: Iterable[float], high: Iterable[float], view: View) -> View:
 
 
 class Session:
-    """`changed(aspect)` tells what the picture must follow; `selected()` tells the panels."""
+    """`changed(aspect)` tells what the picture must follow; `selected()` tells the panels.
+
+    While `bouncing`, light goes on between surfaces by the method `indirect`, with its own of
+    `indirect_params`, which are kept by method; `light`, one of `LIGHTS`, is looked at.
+    """
 
     def __init__(self, view: View | None = None) -> None:
         self.view = view or View()
         self.selection: tuple[NodeId, ...] = ()
         self.backend = "cuts"
         self.params: Mapping[str, Any] = frozen_map()
+        self.bouncing = True
+        self.indirect = "gather"
+        self.indirect_params: Mapping[str, Mapping[str, Any]] = frozen_map()
+        self.light = ALL
         self.exposure = 0.0
         self.tonemap = "srgb"
         self.changed: Signal[[Aspect]] = Signal()
@@ -110,6 +123,26 @@ class Session:
         """Another backend, or other parameters for it."""
         self.backend, self.params = backend, frozen_map(params or {})
         self.changed.emit(Aspect.QUALITY)
+
+    def bounce(
+        self, on: bool | None = None, method: str | None = None, params: Mapping[str, Any] | None = None
+    ) -> None:
+        """Light between surfaces: on or off, by another method, with other parameters of the method."""
+        before = (self.bouncing, self.indirect, self.indirect_params)
+        self.bouncing = self.bouncing if on is None else on
+        self.indirect = method or self.indirect
+        if params is not None:
+            self.indirect_params = frozen_map({**self.indirect_params, self.indirect: frozen_map(params)})
+        if before != (self.bouncing, self.indirect, self.indirect_params):
+            self.changed.emit(Aspect.INDIRECT)
+
+    def show_light(self, light: str) -> None:
+        """Look at other light, of `LIGHTS`. ValueError for another name."""
+        if light not in LIGHTS:
+            raise ValueError(f"there is no light {light!r} to look at; known: {', '.join(LIGHTS)}")
+        if light != self.light:
+            self.light = light
+            self.changed.emit(Aspect.INDIRECT)
 
     def display(self, *, exposure: float | None = None, tonemap: str | None = None) -> None:
         """How the picture is shown; nothing is shaded again."""

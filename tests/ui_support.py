@@ -24,7 +24,7 @@ from studio_core.scene.nodes import Group, Material, MeshObject, Scene
 from studio_core.scene.transform import Transform, looking
 from studio_core.session import View
 from studio_core.shading.artifacts import MeasuredError, Picture
-from studio_core.shading.frame import Frame
+from studio_core.shading.frame import Frame, IndirectChoice
 from studio_core.shading.job import Job
 from studio_core.shading.pipeline import Inputs, Pipeline
 from studio_ui.ask import Filter, LeftoverChoice, Recover, Unsaved
@@ -154,6 +154,9 @@ class Fake:
 
     def params(self, backend: str, values: Mapping[str, Any]) -> Any:
         return dict(values)
+
+    def indirect(self, choice: IndirectChoice) -> IndirectChoice:
+        return choice
 
     def measure(self, pipeline: Pipeline, frame: Frame, job: Job) -> MeasuredError | None:
         self.measured += 1

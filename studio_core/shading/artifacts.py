@@ -387,7 +387,8 @@ class Picture:
     """What the camera sees: scene-linear (H, W, 3), coverage (H, W), node index (H, W) with -1 for nothing.
 
     `distance` (H, W) is metres along the ray of a pixel's first sample, inf where it meets nothing.
-    `colours` are what the pixels were made from.
+    `colours` are what the pixels were made from. With a `share` (H, W), that of light which came by way of
+    other surfaces (NaN where nothing is seen), `linear` has false colours of it.
     """
 
     radiance: Radiance
@@ -396,6 +397,11 @@ class Picture:
     node: npt.NDArray[np.int32]
     distance: F32
     colours: VertexColours | None = None
+    share: F32 | None = None
+
+    def shown_with(self, exposure: float, tonemap: str) -> tuple[float, str]:
+        """Exposure and view transform that it is shown with; false colours have their own."""
+        return (exposure, tonemap) if self.share is None else (0.0, "srgb")
 
     @property
     def nodes(self) -> tuple[NodeId, ...]:

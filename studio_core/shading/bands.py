@@ -23,7 +23,7 @@ from studio_core.raster import CoefficientTable, Compositor
 from studio_core.scene.diff import Aspect, Changes, diff, everything, view_changed
 from studio_core.scene.geometry import Image
 from studio_core.scene.nodes import WHITE, Environment, Light, Node, NodeId, Scene, new_id
-from studio_core.session import View
+from studio_core.session import ALL, SHARE, View
 from studio_core.shading.artifacts import (
     Casters,
     Hits,
@@ -34,7 +34,7 @@ from studio_core.shading.artifacts import (
 )
 from studio_core.shading.backdrop import BackdropPainter
 from studio_core.shading.error_meter import ErrorMeter
-from studio_core.shading.frame import ALL, Frame, IndirectChoice
+from studio_core.shading.frame import Frame, IndirectChoice
 from studio_core.shading.indirect import with_indirect
 from studio_core.shading.job import Job
 from studio_core.shading.job_parts import JobPart
@@ -169,8 +169,10 @@ class PictureMaker:
         """Rows skip … skip + height − 1 of what the hits see."""
         table = self._coefficients(scene, radiance.surfaces)
 
+        make = self._compositor.share if self._light == SHARE else self._compositor.picture
+
         def made(of: Scene, light: Radiance) -> F32:
-            picture = self._compositor.picture(of, light, hits, table, job)
+            picture = make(of, light, hits, table, job)
             return np.ascontiguousarray(picture.linear[skip : skip + height])
 
         sky, alpha, lights = shown_environment(scene), None, {}

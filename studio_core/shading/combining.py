@@ -11,8 +11,9 @@ import numpy.typing as npt
 from studio_core.kernels.refinement import spread
 from studio_core.scene.diff import Aspect
 from studio_core.scene.world_mesh import WorldMesh
+from studio_core.session import INDIRECT
 from studio_core.shading.artifacts import DirectRadiance, Indirect, LayerRadiance, Radiance
-from studio_core.shading.frame import INDIRECT, Frame
+from studio_core.shading.frame import Frame
 from studio_core.shading.interpolation import parents
 from studio_core.shading.job import Job
 from studio_core.shading.job_parts import InnerJob

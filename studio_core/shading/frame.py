@@ -6,12 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from studio_core.scene.nodes import Scene
-from studio_core.session import View
-
-ALL, DIRECT, INDIRECT, SHARE = "all", "direct", "indirect", "share"
-LIGHTS = (ALL, DIRECT, INDIRECT, SHARE)
-"""Which light is looked at: all, what comes straight from lamps and sky, what came by way of other surfaces,
-the share of that."""
+from studio_core.session import ALL, DIRECT, View
 
 
 @dataclass(frozen=True)
@@ -26,9 +21,9 @@ class IndirectChoice:
 class Frame:
     """Scene, view and the backend's parameters; `revision` grows with every request.
 
-    `indirect` says how light goes on between surfaces; None: not at all. `light`, one of `LIGHTS`, is what is
-    looked at. While `moving`, somebody drags or looks around: soon is better than exact, and a frame at rest,
-    with changes of at least VIEW, follows.
+    `indirect` says how light goes on between surfaces; None: not at all. `light`, one of `session.LIGHTS`, is
+    looked at. While `moving`, somebody drags or looks around: soon is better than exact, and a frame at
+    rest, with changes of at least VIEW, follows.
     """
 
     scene: Scene

@@ -16,10 +16,10 @@ from studio_core.raster import PictureStage
 from studio_core.scene.bounds import scene_bounds
 from studio_core.scene.diff import Changes
 from studio_core.scene.nodes import Camera, Scene
-from studio_core.session import View, framing
+from studio_core.session import ALL, View, framing
 from studio_core.shading.artifacts import Casters, MeasuredError, Picture, Radiance
 from studio_core.shading.error_meter import ErrorMeter
-from studio_core.shading.frame import ALL, Frame, IndirectChoice
+from studio_core.shading.frame import Frame, IndirectChoice
 from studio_core.shading.indirect import KIND, with_indirect
 from studio_core.shading.job import Job
 from studio_core.shading.pipeline import Pipeline
@@ -107,7 +107,7 @@ def picture(
     indirect: IndirectChoice | None = None,
     light: str = ALL,
 ) -> Picture:
-    """The picture that `view` sees, scene-linear; `light` of `studio_core.shading.frame.LIGHTS`."""
+    """The picture that `view` sees, scene-linear; `light` of `studio_core.session.LIGHTS`."""
     made = measured_picture(scene, view, backend, params, services, 0, job, indirect=indirect, light=light)
     return made[0]
 

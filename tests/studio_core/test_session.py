@@ -111,3 +111,23 @@ def test_a_part_knows_its_whole() -> None:
 def test_a_part_lies_in_the_picture(top: int, height: int) -> None:
     with pytest.raises(ValueError, match="part"):
         View(width=8, height=6).part(top, height)
+
+
+def test_light_between_surfaces_is_a_matter_of_its_own() -> None:
+    session = Session()
+    heard = listening(session)
+    assert session.bouncing
+    session.bounce()
+    session.bounce(True)
+    session.show_light("all")
+    assert heard == []
+    session.bounce(False)
+    session.bounce(True, "paths", {"samples": 8})
+    session.bounce(method="gather", params={"bounces": 2})
+    session.bounce(method="paths")
+    assert dict(session.indirect_params["paths"]) == {"samples": 8}
+    assert dict(session.indirect_params["gather"]) == {"bounces": 2}
+    session.show_light("share")
+    assert heard == [Aspect.INDIRECT] * 5
+    with pytest.raises(ValueError, match="'dim'"):
+        session.show_light("dim")

@@ -20,7 +20,7 @@ from studio_core.scene.diff import Aspect, Changes, everything, view_changed
 from studio_core.scene.nodes import Light, Scene
 from studio_core.session import Session, View
 from studio_core.shading.artifacts import MeasuredError, Picture
-from studio_core.shading.frame import Frame
+from studio_core.shading.frame import Frame, IndirectChoice
 from studio_core.shading.job import Job
 from studio_core.shading.pipeline import Pipeline
 from studio_core.shading.scheduler import Executor, Scheduler
@@ -70,6 +70,10 @@ class Shading(Protocol):
         """The backend's parameters."""
         ...
 
+    def indirect(self, choice: IndirectChoice) -> IndirectChoice | None:
+        """The choice with its parameters instead of their values by name; None for an unknown method."""
+        ...
+
     def measure(self, pipeline: Pipeline, frame: Frame, job: Job) -> MeasuredError | None:
         """How wrong the pipeline's last picture is."""
         ...
@@ -107,18 +111,24 @@ class LazyPipeline:
             except Exception as error:
                 self._error = error
                 raise
-        params = self._shading.params(self._backend, frame.params)
-        return self._made.update(dataclasses.replace(frame, params=params), changes, job)
+        return self._made.update(self._ready(frame), changes, job)
 
     def complete(self, frame: Frame, job: Job) -> None:
         """See `Pipeline.complete`."""
         if self._made is not None:
-            params = self._shading.params(self._backend, frame.params)
-            self._made.complete(dataclasses.replace(frame, params=params), job)
+            self._made.complete(self._ready(frame), job)
 
     def measure(self, frame: Frame, job: Job) -> MeasuredError | None:
         """The error of what was last made; see `Shading.measure`."""
-        return self._shading.measure(self._made, frame, job) if self._made is not None else None
+        if self._made is None:
+            return None
+        return self._shading.measure(self._made, self._ready(frame), job)
+
+    def _ready(self, frame: Frame) -> Frame:
+        """With parameters instead of values by name."""
+        params = self._shading.params(self._backend, frame.params)
+        choice = None if frame.indirect is None else self._shading.indirect(frame.indirect)
+        return dataclasses.replace(frame, params=params, indirect=choice)
 
 
 class PictureFeed:
@@ -303,7 +313,12 @@ class PictureFeed:
         view = self.frame_view(quick)
         if view != self._asked_view:  # other pixels concern stages as another eye does
             changes, self._asked_view = changes | view_changed(), view
-        frame = Frame(self._document.scene, view, self._session.params, moving=moving)
+        session = self._session
+        by_name = session.indirect_params.get(session.indirect, {})
+        choice = IndirectChoice(session.indirect, by_name) if session.bouncing else None
+        frame = Frame(
+            self._document.scene, view, session.params, 0, moving, indirect=choice, light=session.light
+        )
         asked, finer_only, self._finer_only = self._clock(), self._finer_only, True
         revision = self._revision = self._revision + 1  # as the scheduler counts
         self._asked[revision] = asked

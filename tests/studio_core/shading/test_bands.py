@@ -21,10 +21,10 @@ from studio_core.raster import CoefficientTable, Compositor
 from studio_core.scene.diff import everything
 from studio_core.scene.nodes import Camera, Material, PointLamp
 from studio_core.scene.transform import Transform
-from studio_core.session import View
+from studio_core.session import INDIRECT, View
 from studio_core.shading.artifacts import Casters, Surfaces
 from studio_core.shading.bands import BETWEEN, Parts, PictureMaker, guide, rows_of
-from studio_core.shading.frame import INDIRECT, IndirectChoice
+from studio_core.shading.frame import IndirectChoice
 from studio_core.shading.job import Job
 from studio_core.shading.job_parts import STEPS, JobPart
 from studio_core.shading.offline import backend_params, picture

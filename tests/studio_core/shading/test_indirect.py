@@ -15,13 +15,16 @@ from hypothesis import strategies as st
 from scenes import little_scene as make_little_scene
 
 from studio_core import edits
+from studio_core.colour import LUMINANCE
 from studio_core.contract import Services
 from studio_core.document import Document
 from studio_core.errors import Cancelled, InputError, PluginError
+from studio_core.false_colour import linear_colours
 from studio_core.raster import PictureStage
 from studio_core.scene.diff import Aspect, Changes, view_changed
 from studio_core.scene.nodes import PointLamp
 from studio_core.scene.transform import Transform, looking
+from studio_core.session import ALL, DIRECT, INDIRECT, SHARE
 from studio_core.shading.artifacts import (
     DirectRadiance,
     Hits,
@@ -31,7 +34,7 @@ from studio_core.shading.artifacts import (
     Receivers,
     Surfaces,
 )
-from studio_core.shading.frame import ALL, DIRECT, INDIRECT, Frame, IndirectChoice
+from studio_core.shading.frame import Frame, IndirectChoice
 from studio_core.shading.indirect import IndirectStage, with_indirect
 from studio_core.shading.job import Job
 from studio_core.shading.offline import backend_params, indirect_choice, picture, scene_view
@@ -352,3 +355,23 @@ def test_cancelled_work_is_not_forgotten(host, workers, course) -> None:
     assert one.made(Indirect).final
     receivers = one.bounce.made[0][1].before
     assert any(isinstance(part, Receivers) for part in receivers)
+
+
+def test_the_share_of_light_between_surfaces_as_colours(lit) -> None:
+    one = lit(scene=make_little_scene(cube_model="phong").with_nodes(LAMP))
+    every = {}
+    for light in (ALL, INDIRECT, SHARE):
+        one.choose(light=light)
+        every[light] = one.look()
+    made, hit = every[SHARE], every[ALL].coverage == 1
+    luminance = np.array(LUMINANCE)
+    expected = (every[INDIRECT].linear[hit] @ luminance) / (every[ALL].linear[hit] @ luminance)
+    np.testing.assert_allclose(made.share[hit], expected, rtol=1e-4, atol=1e-5)
+    assert 0.02 < expected.min() < expected.max() < 0.98
+    np.testing.assert_allclose(made.linear[hit], linear_colours(made.share[hit]))
+    assert np.isnan(made.share[every[ALL].coverage == 0]).all()
+    assert made.colours is None
+    assert made.shown_with(3.0, "filmic") == (0.0, "srgb")
+    assert every[ALL].shown_with(3.0, "filmic") == (3.0, "filmic")
+    one.choose(None)
+    assert not one.look().share[hit].any()

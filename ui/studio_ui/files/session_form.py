@@ -12,7 +12,7 @@ from studio_core.kernels.tonemap import KINDS
 from studio_core.scene.bounds import scene_bounds
 from studio_core.scene.nodes import Camera, Scene
 from studio_core.scene.transform import Transform, normalized, vec3
-from studio_core.session import Session, View, framing
+from studio_core.session import LIGHTS, Session, View, framing
 
 
 def session_form(session: Session) -> dict[str, Any]:
@@ -29,6 +29,10 @@ def session_form(session: Session) -> dict[str, Any]:
         "tonemap": session.tonemap,
         "backend": session.backend,
         "params": dict(session.params),
+        "bouncing": session.bouncing,
+        "indirect": session.indirect,
+        "indirect_params": {name: dict(values) for name, values in session.indirect_params.items()},
+        "light": session.light,
     }
 
 
@@ -46,6 +50,23 @@ def take_session(session: Session, form: Mapping[str, Any], scene: Scene, backen
         plain = params if isinstance(params, dict) else {}
         if (backend, dict(plain)) != (session.backend, dict(session.params)):
             session.shade_with(str(backend), frozen_map(plain))
+
+    _take_bounces(session, form)
+
+
+def _take_bounces(session: Session, form: Mapping[str, Any]) -> None:
+    """How light goes on between surfaces; what a project does not say is as at the start."""
+    plain, light = Session(), form.get("light")
+    on, method, params = form.get("bouncing"), form.get("indirect"), form.get("indirect_params")
+    session.bounce(
+        on if isinstance(on, bool) else plain.bouncing,
+        method if isinstance(method, str) and method else plain.indirect,
+    )
+    known = params if isinstance(params, dict) else {}
+    session.indirect_params = frozen_map(
+        {name: frozen_map(values) for name, values in known.items() if isinstance(values, dict)}
+    )
+    session.show_light(light if light in LIGHTS else plain.light)
 
 
 def first_view(scene: Scene, view: View) -> View:

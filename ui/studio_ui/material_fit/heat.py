@@ -8,13 +8,10 @@ from PySide6.QtCore import QRectF, QSize, Qt
 from PySide6.QtGui import QColor, QImage, QPainter, QPaintEvent
 from PySide6.QtWidgets import QSizePolicy
 
+from studio_core.false_colour import false_colours
 from studio_ui.material_view.plots import Plot
 
 LEAST, MOST = 0.01, 1.0  # of the lamp's usual brightness
-_ANCHORS = np.array(
-    [[0, 0, 4], [51, 10, 95], [120, 28, 109], [187, 55, 84], [237, 105, 37], [252, 180, 26], [252, 255, 164]],
-    np.float64,
-)  # matplotlib's inferno (CC0, van der Walt and Smith 2015) at seven even places
 _NOTHING = (70, 78, 84)  # where nothing counts: no colour of the scale
 _TICKS = ((0.01, "1 %"), (0.03, "3 %"), (0.1, "10 %"), (0.3, "30 %"), (1.0, "100 %"))
 
@@ -23,10 +20,7 @@ def heat(error: npt.NDArray[np.float32]) -> npt.NDArray[np.uint8]:
     """(h, w, 3) colours of relative errors (h, w); NaN is grey."""
     with np.errstate(divide="ignore", invalid="ignore"):
         place = np.log(error / LEAST) / np.log(MOST / LEAST)
-    place = np.clip(np.nan_to_num(place, nan=0.0, neginf=0.0, posinf=1.0), 0, 1) * (len(_ANCHORS) - 1)
-    low = np.minimum(place.astype(np.intp), len(_ANCHORS) - 2)
-    share = (place - low)[..., None]
-    made = np.rint(_ANCHORS[low] * (1 - share) + _ANCHORS[low + 1] * share).astype(np.uint8)
+    made = false_colours(np.nan_to_num(place, nan=0.0, neginf=0.0, posinf=1.0))
     made[np.isnan(error)] = _NOTHING
     return np.ascontiguousarray(made)
 
