@@ -39,7 +39,7 @@ F64 = npt.NDArray[np.float64]
 BACKEND = "cuts"
 METHODS = {"": "gather", "paper/": "fields"}
 IN_PARTS = True
-PARTS: tuple[str, ...] = ()
+PARTS: tuple[str, ...] = ("studio.bench.interreflection_operator",)
 """Modules with further cases: each has `run(report, program, setup)`."""
 BOUNCES = 3
 WALL = "wall"
