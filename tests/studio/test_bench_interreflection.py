@@ -17,6 +17,7 @@ from studio.bench.harness import Report
 from studio.bench.interreflection import Setup, errors_of, measure
 from studio.bench.interreflection_edits import EDITS
 from studio.bench.interreflection_meshes import box, shell
+from studio.bench.interreflection_operator import Stand, kept_rays, products, source_light
 from studio.bench.interreflection_scenes import Setting, bleeding, furnace, pot_on_floor
 from studio.bench.interreflection_truth import Light3, Truth, scene_key
 from studio.headless import Headless
@@ -213,6 +214,24 @@ def test_a_key_tells_scenes_apart_but_not_cameras() -> None:
     moved = one.with_nodes(dataclasses.replace(one["camera"], transform=Transform((0.1, 0.0, 0.0))))
     assert scene_key(one) == scene_key(moved) == scene_key(furnace(0.5))
     assert len({scene_key(one), scene_key(other), scene_key(furnace(0.5, curved=True))}) == 3
+
+
+def test_parts_of_the_operator_are_measured(program: Headless) -> None:
+    report, start = Report("interreflection", True), painted(little_room())
+    kept_rays(report, "rays", Stand.of(start, program), program, 16)
+    rays = figures(report)
+    assert 0 < rays["share_redone"] < 1
+    assert rays["bytes"] > 16 * 6 * 400
+    assert rays["mrays_per_s"] > 0
+    report = Report("interreflection", True)
+    source_light(report, "light", Stand.of(start, program), program)
+    assert set(figures(report)) == {"ms_trace", "ms_sums", "ms_move", "bytes"}
+    report = Report("interreflection", True)
+    products(report, "lobe", program, 10.0)
+    found = figures(report)
+    assert found["products_5"] > found["products_15"] > found["products_30"] > 1
+    assert all(found[f"error_{tolerance}"] <= tolerance / 100 for tolerance in (5, 15, 30))
+    program.close()
 
 
 def test_the_suite_knows_its_methods() -> None:
