@@ -98,6 +98,18 @@ def work(program: Headless) -> None:
     show(_embossed(scene), aside, False)
     ErrorMeter(services)(pipeline, first[-1], Job("measuring ahead"))
     pipeline.complete(first[-1], Job("completing ahead"))
+    _bounce(program, first[-1])
+
+
+def _bounce(program: Headless, frame: Any) -> None:
+    """Light between surfaces by path tracing, which errors are measured by."""
+    from studio_core.shading.offline import backend_params, indirect_choice, measured_picture
+
+    backend = program.registry.get("backend", "reference")
+    params = backend_params(backend, {"vertices": 1500, "directions": "1024"})
+    paths = indirect_choice(program.registry, "paths", {"samples": 4})
+    services = dataclasses.replace(program.services, cache=None)
+    measured_picture(frame.scene, frame.view, backend, params, services, 4, indirect=paths)
 
 
 def _embossed(scene: Any) -> Any:

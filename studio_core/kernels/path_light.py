@@ -186,8 +186,7 @@ def light_paths(
                 kind, pick = lights.kind[lamp], upto / own
                 u0, u1 = next_random(paths.random, n), next_random(paths.random, n)
                 if kind == SUNS:
-                    q = np.searchsorted(lights.sun_upto, u0 * lights.sun_upto[-1], side="right")
-                    q = min(q, len(lights.sun_upto) - 1)
+                    q = _chosen(lights.sun_upto, u0)
                     chance = lights.sun_upto[q] - (lights.sun_upto[q - 1] if q > 0 else 0.0)
                     pick *= lights.sun_upto[-1] / max(chance, 1e-300)
                     for axis in range(3):
@@ -237,10 +236,7 @@ def light_paths(
             for c in range(3):
                 given[SKY, lane, c] = 0.0
             if lights.k > 0:
-                leaf = np.searchsorted(
-                    lights.upto, next_random(paths.random, n) * lights.upto[-1], side="right"
-                )
-                leaf = min(leaf, len(lights.upto) - 1)
+                leaf = _chosen(lights.upto, next_random(paths.random, n))
                 sky = lights.chance[leaf]
                 hemisphere, column, line = cell_of_leaf(leaf, lights.k)
                 s = (column + next_random(paths.random, n)) / np.float32(1 << (lights.k // 2))
@@ -343,6 +339,20 @@ def _local(axes: F64, x: float, y: float, z: float) -> tuple[float, float, float
         axes[1, 0] * x + axes[1, 1] * y + axes[1, 2] * z,
         axes[2, 0] * x + axes[2, 1] * y + axes[2, 2] * z,
     )
+
+
+@kernel
+def _chosen(upto: F64, share: np.float32) -> int:
+    """The first item whose running sum is over a share of all."""
+    level = share * upto[-1]
+    low, high = 0, len(upto) - 1
+    while low < high:
+        middle = (low + high) >> 1
+        if upto[middle] > level:
+            high = middle
+        else:
+            low = middle + 1
+    return low
 
 
 @kernel

@@ -427,11 +427,12 @@ class Error:
 
 @dataclass(frozen=True)
 class MeasuredError:
-    """Errors of a picture and of its vertices, in all and by light layer."""
+    """Errors of a picture and of its vertices, in all and by light layer; of light between surfaces alone."""
 
     picture: Error
     vertices: Error
     layers: Mapping[NodeId, Error] = field(default_factory=dict)
+    indirect: Error | None = None
 
     def as_dict(self) -> dict[str, object]:
         """For --json."""

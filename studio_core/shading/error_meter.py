@@ -3,6 +3,9 @@
 Two errors, both relative RMSE of linear radiance: of the *picture* (at random samples of it, where the
 true surface point is lit by brute force: what vertices, interpolation and the backend do together) and of
 the *vertices* (at random shown vertices: what the backend does alone).
+
+Light between surfaces is path traced there, twice: noise that the two do not share is no error of what is
+shown, and drops out of the mean of (shown − first) (shown − second).
 """
 
 from __future__ import annotations
@@ -17,7 +20,6 @@ from studio_core.raster import Coefficients, CoefficientTable, Compositor
 from studio_core.scene.nodes import Light, NodeId
 from studio_core.shading.artifacts import (
     Casters,
-    ChosenPoints,
     Error,
     Hits,
     LayerRadiance,
@@ -30,6 +32,8 @@ from studio_core.shading.artifacts import (
 from studio_core.shading.brute_force import VisibilityBits, all_points, environment_layer, lamp_layer
 from studio_core.shading.frame import Frame
 from studio_core.shading.job import Job
+from studio_core.shading.path_tracing import PathSettings, bounces_of, chosen_points, indirect_halves
+from studio_core.shading.path_world import PathWorld, PathWorlds
 from studio_core.shading.pipeline import Pipeline
 from studio_core.shading.surface_points import mapped_points, some_hits, surface_points, surface_uvs
 from studio_core.shading.varying import ShapeTable
@@ -39,24 +43,32 @@ F64 = npt.NDArray[np.float64]
 LEVEL = 15
 LAMP_SAMPLES = 256
 RESAMPLINGS = 200
+PATHS = 1024
+"""Paths a place, where light between surfaces is measured."""
 
 
-def compare(shown: npt.ArrayLike, true: npt.ArrayLike, seed: int = 0) -> Error:
+def compare(
+    shown: npt.ArrayLike, true: npt.ArrayLike, seed: int = 0, again: npt.ArrayLike | None = None
+) -> Error:
     """The error of (N, 3) radiance; its standard error by bootstrap over the places.
 
     All is relative to the mean of what is true. Where that is black and what is shown is not, it is relative
-    to the mean of what is shown: at least 1, as if all of it were wrong.
+    to the mean of what is shown: at least 1, as if all of it were wrong. With `again`, `true` and it are two
+    independent estimates of the truth whose noise does not count, but for the percentile.
     """
     a, b = np.asarray(shown, np.float64), np.asarray(true, np.float64)
-    relative_to = b if b.any() else a
+    c = b if again is None else np.asarray(again, np.float64)
+    truth = (b + c) / 2
+    relative_to = truth if truth.any() else a
     if not relative_to.any():
         return Error(0.0, 0.0, len(b))
-    squares, means = ((a - b) ** 2).mean(axis=1), relative_to.mean(axis=1)
+    squares, means = ((a - b) * (a - c)).mean(axis=1), relative_to.mean(axis=1)
     drawn = np.random.default_rng(seed).integers(0, len(b), (RESAMPLINGS, len(b)))
-    again = np.sqrt(squares[drawn].mean(axis=1)) / np.maximum(means[drawn].mean(axis=1), 1e-30)
-    worst = np.percentile(np.abs(a - b).mean(axis=1), 99) / means.mean()
-    found = float(np.sqrt(squares.mean()) / means.mean())
-    return Error(found, float(again.std()), len(b), float(worst))
+    redrawn = np.sqrt(np.maximum(squares[drawn].mean(axis=1), 0))
+    redrawn /= np.maximum(means[drawn].mean(axis=1), 1e-30)
+    worst = np.percentile(np.abs(a - truth).mean(axis=1), 99) / means.mean()
+    found = float(np.sqrt(max(squares.mean(), 0)) / means.mean())
+    return Error(found, float(redrawn.std()), len(b), float(worst))
 
 
 class ErrorMeter:
@@ -68,14 +80,16 @@ class ErrorMeter:
         self._coefficients = CoefficientTable(services.registry)
         self._shapes = ShapeTable(services.registry)
         self._compositor = Compositor(services.workers)
+        self._worlds = PathWorlds(services.registry)
 
     def __call__(
         self, pipeline: Pipeline, frame: Frame, job: Job, places: int | None = None
     ) -> MeasuredError | None:
         """Errors of the pipeline's radiance for `frame`; None where nothing opaque is seen.
 
-        Layers that brute force does not make (light that came by way of other surfaces) are left out on
-        both sides. With more `places` the errors are surer: their standard error says how sure.
+        Light between surfaces is compared with as many bounces as the frame asks for. Layers that brute force
+        does not make are left out on both sides. With more `places` the errors are surer: their standard
+        error says how sure.
         """
         radiance, shapes = pipeline.artifact(Radiance), pipeline.artifact(Shapes)
         lighting, casters = pipeline.artifact(Lighting), pipeline.artifact(Casters)
@@ -107,19 +121,30 @@ class ErrorMeter:
         albedo = np.divide(photograph, before, out=np.zeros(before.shape), where=before > 0)
         shown_layers, true_layers = {}, {}
         for layer in radiance.layers:
-            one = dataclasses.replace(radiance, layers={layer: radiance.layers[layer]})
+            one = dataclasses.replace(radiance, layers={layer: radiance.layers[layer]}, indirect=None)
             shown_layers[layer] = self._compositor.radiance(frame.scene, one, seen, table, job, chosen)
-            lit = dataclasses.replace(
-                radiance, layers={layer: truth[layer]}, valid=np.ones(len(chosen), np.bool_)
-            )
-            true_layers[layer] = (lit.combined(lights) * looks).sum(axis=1)
-            true_layers[layer][caught] = lit.irradiance(lights)[caught] * albedo
+            gain = np.asarray(lights[layer].gain() if layer in lights else (0, 0, 0), np.float32)
+            true_layers[layer] = (truth[layer].terms * looks).sum(axis=1) * gain
+            true_layers[layer][caught] = truth[layer].irradiance[caught] * gain * albedo
+        by_layer = {k: compare(shown_layers[k], np.maximum(true_layers[k], 0)) for k in shown_layers}
         # What is below 0 is cut off once all light is summed.
         shown = self._compositor.radiance(frame.scene, radiance, seen, table, job, chosen)
-        true = np.maximum(sum(true_layers.values(), np.zeros((len(chosen), 3), np.float32)), 0)
-        by_layer = {k: compare(shown_layers[k], np.maximum(true_layers[k], 0)) for k in shown_layers}
-        vertices = self._vertices(radiance, shapes, lighting, casters, frame, table, rng, places, job)
-        return MeasuredError(compare(shown, true), vertices, by_layer)
+        straight = sum(true_layers.values(), np.zeros((len(chosen), 3), np.float32))
+        world, indirect = None, None
+        true, again = straight, straight
+        if radiance.indirect is not None:
+            world = self._worlds(frame.scene, surfaces, casters, lighting)
+            halves = []
+            for half in self._bounced(points, facing, there, world, frame, job):
+                halves.append((half.terms * looks).sum(axis=1))
+                halves[-1][caught] = half.irradiance[caught] * albedo
+            alone = dataclasses.replace(radiance, layers={}, pixel=None)
+            light = self._compositor.radiance(frame.scene, alone, seen, table, job, chosen)
+            indirect = compare(light, halves[0], again=halves[1])
+            true, again = straight + halves[0], straight + halves[1]
+        picture = compare(shown, np.maximum(true, 0), again=np.maximum(again, 0))
+        vertices = self._vertices(radiance, shapes, lighting, casters, world, frame, table, rng, places, job)
+        return MeasuredError(picture, vertices, by_layer, indirect)
 
     def _vertices(
         self,
@@ -127,6 +152,7 @@ class ErrorMeter:
         shapes: Shapes,
         lighting: Lighting,
         casters: Casters,
+        world: PathWorld | None,
         frame: Frame,
         table: Coefficients,
         rng: np.random.Generator,
@@ -136,22 +162,37 @@ class ErrorMeter:
         mesh = radiance.surfaces.mesh
         valid = np.flatnonzero(radiance.valid)
         some = np.sort(rng.choice(valid, min(places, len(valid)), replace=False))
-        points = ChosenPoints(
-            mesh.origin,
-            mesh.positions[some],
-            mesh.normals[some],
-            mesh.tangents[some],
-            mesh.geometric[some],
-            mesh.inset[some],
-            mesh.material[some],
-        )
-        truth = self._brute(points, points, shapes.of_points(some), lighting, casters, frame, job)
+        points, own = chosen_points(mesh, some), shapes.of_points(some)
+        truth = self._brute(points, points, own, lighting, casters, frame, job)
         lights = _lights(frame)
         looks = table.typical[mesh.material[some]].reshape(-1, table.width, 3)
         shown = (radiance.combined(lights)[some] * looks).sum(axis=1)
         truth = {node: truth[node] for node in radiance.layers}
-        exact = dataclasses.replace(radiance, layers=truth, valid=np.ones(len(some), np.bool_))
-        return compare(shown, (exact.combined(lights) * looks).sum(axis=1))
+        every = np.ones(len(some), np.bool_)
+        exact = dataclasses.replace(radiance, layers=truth, valid=every, indirect=None)
+        straight = np.zeros((len(some), 3), np.float32)  # where light between surfaces is looked at alone
+        if truth:
+            straight = (exact.combined(lights) * looks).sum(axis=1)
+        if world is None:
+            return compare(shown, straight)
+        halves = self._bounced(points, points, own, world, frame, job)
+        one, other = (straight + (half.terms * looks).sum(axis=1) for half in halves)
+        return compare(shown, one, again=other)
+
+    def _bounced(
+        self,
+        points: ShadingPoints,
+        facing: ShadingPoints,
+        shapes: Shapes,
+        world: PathWorld,
+        frame: Frame,
+        job: Job,
+    ) -> tuple[LayerRadiance, LayerRadiance]:
+        """Light that came by way of other surfaces, twice, on surfaces that face as `facing` does."""
+        eye = np.asarray(frame.view.transform.translation, np.float64)
+        settings = PathSettings(bounces_of(frame), PATHS, frame.revision)
+        plain = dataclasses.replace(shapes, tilt=None)
+        return indirect_halves(points, plain, eye, world, settings, self._workers, job, facing)
 
     def _brute(
         self,

@@ -28,6 +28,7 @@ from studio_core.kernels.visibility import lifted
 from studio_core.parallel import Workers
 from studio_core.shading.artifacts import ChosenPoints, LayerRadiance, ShadingPoints, Shapes
 from studio_core.shading.brute_force import blank_layer
+from studio_core.shading.frame import Frame
 from studio_core.shading.job import Job
 from studio_core.shading.path_world import PathWorld
 from studio_core.shading.tilting import Facing, facings, gather_tilts
@@ -53,6 +54,14 @@ class PathSettings:
     bounces: int = 3
     samples: int = 256
     seed: int = 0
+
+
+def bounces_of(frame: Frame) -> int:
+    """How many surfaces light goes by: `bounces` of the method's parameters; many where it is to settle."""
+    params = None if frame.indirect is None else frame.indirect.params
+    if getattr(params, "converged", False):
+        return CONVERGED
+    return int(getattr(params, "bounces", PathSettings.bounces))
 
 
 @dataclass
@@ -304,6 +313,7 @@ __all__ = [
     "CONVERGED",
     "PathCounts",
     "PathSettings",
+    "bounces_of",
     "chosen_points",
     "growing",
     "indirect_halves",

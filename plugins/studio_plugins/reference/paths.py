@@ -29,6 +29,7 @@ from studio_core.shading.path_tracing import (
     CONVERGED,
     PathCounts,
     PathSettings,
+    bounces_of,
     chosen_points,
     growing,
     indirect_layer,
@@ -78,7 +79,7 @@ class PathStage:
         assert frame.indirect is not None
         params: Params = frame.indirect.params
         surfaces, shapes, receivers = inputs[Surfaces], inputs[Shapes], inputs[Receivers]
-        bounces = CONVERGED if params.converged else params.bounces
+        bounces = bounces_of(frame)
         samples = min(IN_HAND, params.samples) if frame.moving else params.samples
         scene = frame.scene
         key = (inputs[Casters], inputs[Lighting], surfaces, shapes, receivers, bounces, samples, scene)
