@@ -1,0 +1,113 @@
+"""Kept rays by the lobes of glossy receivers; drawn anew where eye, material or pose are others."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from studio_core.contract import Services
+from studio_core.scene.nodes import Scene
+from studio_core.shading.artifacts import Casters, Receivers, Shapes, Surfaces
+from studio_core.shading.job import Job
+from studio_core.transport.operator import RayTransport
+from studio_core.transport.patterns import variants_of
+from studio_plugins.interreflection.gather.lobes import Lobes, LobeTable, draw_lobes
+
+F32 = npt.NDArray[np.float32]
+CHUNK = 1 << 8
+VARIANTS = 64
+SEED = 3000
+
+
+@dataclass(frozen=True, eq=False)
+class Drawn:
+    """Lobes, `count` rays each along directions (G, count, 3); no transport where nobody has a lobe."""
+
+    lobes: Lobes
+    count: int
+    directions: F32
+    transport: RayTransport | None
+    rays: int
+
+
+class LobeRays:
+    """Owned by the compute thread."""
+
+    def __init__(self, services: Services) -> None:
+        self._workers = services.workers
+        self._table = LobeTable(services.registry)
+        self._rays = 0
+        self._transport = RayTransport(services.workers, 0)
+        self._numbers: dict[tuple[int, int], F32] = {}
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of kept rays."""
+        return self._transport.nbytes
+
+    def update(
+        self,
+        scene: Scene,
+        surfaces: Surfaces,
+        casters: Casters,
+        shapes: Shapes,
+        receivers: Receivers,
+        count: int,
+        job: Job,
+    ) -> Drawn:
+        """Rays of all glossy receivers; those that go where they went are not traced again."""
+        mesh, row = surfaces.mesh, shapes.rows(surfaces.mesh)
+        lobes = self._table(scene, surfaces.materials, shapes)
+        glossy = np.append(lobes.rows, False)[row] & receivers.seen
+        rows = np.flatnonzero(glossy)
+        directions = np.zeros((len(rows), count, 3), np.float32)
+        if not len(rows):
+            return Drawn(lobes, 0, directions, None, 0)
+        numbers = self._spread(shapes.width, count)
+        eye = (receivers.eye - mesh.origin).astype(np.float32)
+        variant = variants_of(rows, VARIANTS)
+
+        def draw(start: int, stop: int) -> None:
+            draw_lobes(
+                start,
+                stop,
+                rows,
+                variant,
+                mesh.positions,
+                mesh.normals,
+                mesh.tangents,
+                row,
+                eye,
+                shapes.offset,
+                shapes.data,
+                lobes.sampler,
+                lobes.peaked,
+                numbers,
+                directions,
+            )
+
+        self._workers.run(len(rows), CHUNK, draw, job)
+        if count != self._rays:
+            self._transport, self._rays = RayTransport(self._workers, count), count
+        done = self._transport.update(surfaces, casters, rows, directions, job)
+        return Drawn(lobes, count, directions, self._transport, done.rays)
+
+    def _spread(self, terms: int, count: int) -> F32:
+        """(VARIANTS, terms, count, 2) evenly spread numbers in [0, 1)."""
+        key = (terms, count)
+        if key not in self._numbers:
+            self._numbers[key] = spread_numbers(VARIANTS, terms, count, SEED)
+        return self._numbers[key]
+
+
+def spread_numbers(variants: int, terms: int, count: int, seed: int) -> F32:
+    """(variants, terms, count, 2): points of the R2 sequence (Roberts 2018), each set shifted at random.
+
+    The first `n` of a set are evenly spread for every n.
+    """
+    steps = np.array([0.7548776662466927, 0.5698402909980532])
+    shift = np.random.default_rng(seed).random((variants, terms, 1, 2))
+    made = (shift + (np.arange(count) + 0.5)[:, None] * steps) % 1.0
+    return np.minimum(made, 1 - 2.0**-24).astype(np.float32)

@@ -1,0 +1,357 @@
+"""The stages: separated BRDFs, coefficients, kept rays, what all vertices send, what receivers get of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from studio_core.contract import Services
+from studio_core.scene.diff import Aspect
+from studio_core.scene.nodes import Light as LightNode
+from studio_core.shading.artifacts import (
+    Casters,
+    Indirect,
+    LayerRadiance,
+    Lighting,
+    Receivers,
+    Shapes,
+    Surfaces,
+)
+from studio_core.shading.brute_force import blank_layer
+from studio_core.shading.frame import Frame
+from studio_core.shading.job import Job
+from studio_core.shading.kept import Kept
+from studio_core.shading.pipeline import Inputs
+from studio_core.shading.tilting import facings, gather_tilts
+from studio_core.transport.bounces import Light, Sources, Surface, bounced, reflected
+from studio_core.transport.operator import Transport
+from studio_core.transport.patterns import cosine_pattern
+from studio_core.transport.reflectance import VertexCoefficients
+from studio_core.transport.separable import Separated, Separator
+from studio_core.transport.source_light import SampleCounts, SourceLight
+from studio_plugins.interreflection.gather.final import add_flat_terms, gather_final
+from studio_plugins.interreflection.gather.lobe_rays import LobeRays
+from studio_plugins.interreflection.gather.smooth import Neighbours, Spacing, smoothed
+from studio_plugins.interreflection.gather.tiers import Chosen, Tier, TierStage
+
+F32 = npt.NDArray[np.float32]
+I64 = npt.NDArray[np.int64]
+Bools = npt.NDArray[np.bool_]
+CHUNK = 1 << 9
+INNER_SEED, FINAL_SEED = 1000, 2000  # apart: what receivers meet must not be what chose the sources' light
+
+
+class SeparateStage:
+    """Separated BRDFs; as many functions as the tier allows."""
+
+    needs: tuple[type, ...] = (Shapes, Chosen)
+    gives = Separated
+    dirtied_by = Aspect.NONE
+
+    def __init__(self) -> None:
+        self._separator = Separator()
+
+    def run(self, frame: Frame, inputs: Inputs, job: Job) -> Separated:
+        """The previous where neither shapes nor what is asked for differ."""
+        tier = inputs[Chosen].tier
+        return self._separator(inputs[Shapes], tier.lobe_error, tier.functions)
+
+
+@dataclass(frozen=True, eq=False)
+class Reflecting:
+    """Coefficients (V, T, 3) of the materials' terms at vertices."""
+
+    coefficients: F32
+
+
+class ReflectingStage:
+    """What materials are at vertices."""
+
+    needs: tuple[type, ...] = (Surfaces, Shapes)
+    gives = Reflecting
+    dirtied_by = Aspect.MATERIAL
+
+    def __init__(self, services: Services) -> None:
+        self._coefficients = VertexCoefficients(services)
+
+    def run(self, frame: Frame, inputs: Inputs, job: Job) -> Reflecting:
+        """The previous where nothing differs."""
+        made = self._coefficients(frame.scene, inputs[Surfaces])
+        previous: Reflecting | None = inputs.previous
+        return previous if previous is not None and previous.coefficients is made else Reflecting(made)
+
+
+@dataclass(frozen=True, eq=False)
+class Meetings:
+    """Kept rays of all vertices, one table a tier; `number` grows whenever one changed."""
+
+    tables: tuple[Transport, ...]
+    number: int
+    rays: int
+
+
+class MeetingsStage:
+    """What the rays of all vertices meet; after a move only what it touches is traced."""
+
+    needs: tuple[type, ...] = (Surfaces, Casters, Chosen)
+    gives = Meetings
+    dirtied_by = Aspect.NONE
+
+    def __init__(self, services: Services) -> None:
+        self._workers = services.workers
+        self._tables = _Tables(services, INNER_SEED)
+
+    def run(self, frame: Frame, inputs: Inputs, job: Job) -> Meetings:
+        """Tables brought up to date."""
+        surfaces = inputs[Surfaces]
+        every = np.ones(len(surfaces.mesh.positions), np.bool_)
+        return self._tables(inputs[Chosen].tier.inner, surfaces, inputs[Casters], every, inputs.previous, job)
+
+
+class _Tables:
+    """One `Transport` for each number of rays, of independent patterns."""
+
+    def __init__(self, services: Services, seed: int) -> None:
+        self._workers = services.workers
+        self._seed = seed
+        self._held: dict[int, Transport] = {}
+
+    def __call__(
+        self,
+        counts: tuple[int, ...],
+        surfaces: Surfaces,
+        casters: Casters,
+        wanted: Bools,
+        previous: Meetings | None,
+        job: Job,
+    ) -> Meetings:
+        """Those of a tier; finer ones wait for theirs."""
+        tables, rays, changed = [], 0, False
+        for index, count in enumerate(counts):
+            if index not in self._held:
+                pattern = cosine_pattern(count, seed=self._seed + index)
+                self._held[index] = Transport(self._workers, pattern)
+            table = self._held[index]
+            done = table.update(surfaces, casters, wanted, job)
+            rays += done.rays
+            changed |= done.rays > 0 or bool(table.touched.any())
+            tables.append(table)
+        if previous is not None and not changed and previous.tables == tuple(tables):
+            return previous
+        return Meetings(tuple(tables), previous.number + 1 if previous is not None else 1, rays)
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of all tables."""
+        return sum(table.nbytes for table in self._held.values())
+
+
+@dataclass(frozen=True, eq=False)
+class Sent:
+    """What all vertices send, and how they send it."""
+
+    sources: Sources
+    surface: Surface
+    rays: int
+    nbytes: int
+
+
+class SentStage:
+    """Light straight from lamps and environment, and its bounces."""
+
+    needs: tuple[type, ...] = (
+        Surfaces,
+        Casters,
+        Shapes,
+        Lighting,
+        Chosen,
+        Separated,
+        Reflecting,
+        Meetings,
+    )
+    gives = Sent
+    dirtied_by = Aspect.GAIN | Aspect.LIGHT | Aspect.QUALITY
+
+    def __init__(self, services: Services) -> None:
+        self._workers = services.workers
+        self._light = SourceLight(services.workers)
+
+    def run(self, frame: Frame, inputs: Inputs, job: Job) -> Sent:
+        """All bounces that were asked for."""
+        surfaces, shapes, separated = inputs[Surfaces], inputs[Shapes], inputs[Separated]
+        tier, params = inputs[Chosen].tier, _params(frame)
+        samples = SampleCounts(tier.lamp_samples, tier.environment_samples)
+        counted = self._light.update(surfaces, inputs[Casters], inputs[Lighting], samples, job)
+        lights = {n.id: n for n in frame.scene.of(LightNode) if frame.scene.shown(n.id)}
+        irradiance, slot, functions = self._light.sums(surfaces, shapes, separated, lights, None, job)
+        surface = Surface(
+            shapes.rows(surfaces.mesh), slot, len(functions), inputs[Reflecting].coefficients, separated
+        )
+        straight = reflected(Light(irradiance, functions), surface, self._workers, job)
+        bounces = None if params.settle else params.bounces
+        made = bounced(straight, bounces, inputs[Meetings].tables, surface, self._workers, job)
+        nbytes = self._light.nbytes + made.light.matte.nbytes + made.light.functions.nbytes
+        return Sent(made, surface, counted.rays, nbytes)
+
+
+class FinalStage:
+    """What receivers get of all that is sent."""
+
+    needs: tuple[type, ...] = (
+        Surfaces,
+        Casters,
+        Shapes,
+        Receivers,
+        Chosen,
+        Separated,
+        Meetings,
+        Sent,
+    )
+    gives = Indirect
+    dirtied_by = Aspect.VIEW
+
+    def __init__(self, services: Services) -> None:
+        self._workers = services.workers
+        self._tables = _Tables(services, FINAL_SEED)
+        self._lobes = LobeRays(services)
+        self._neighbours = Neighbours()
+        self._spacing: Kept[Spacing] = Kept()
+        self._meetings: Meetings | None = None
+
+    def run(self, frame: Frame, inputs: Inputs, job: Job) -> Indirect:
+        """The layer at the receivers."""
+        surfaces, shapes, receivers = inputs[Surfaces], inputs[Shapes], inputs[Receivers]
+        mesh, sent, chosen = surfaces.mesh, inputs[Sent], inputs[Chosen]
+        wanted, casters = receivers.seen, inputs[Casters]
+        met = self._tables(chosen.tier.final, surfaces, casters, wanted, self._meetings, job)
+        self._meetings = met
+        lobes = self._lobes.update(
+            frame.scene, surfaces, casters, shapes, receivers, chosen.tier.lobes, job
+        )
+        layer = blank_layer(mesh, shapes)
+        cosine_rays = sum(chosen.tier.final)
+        spacing = self._spacing(lambda: Spacing.of(met.tables[0].table), met)
+        neighbours = self._neighbours(mesh)
+        eye = (receivers.eye - mesh.origin).astype(np.float32)
+        row, separated = shapes.rows(mesh), inputs[Separated]
+        vertices = np.flatnonzero(wanted)
+        ways = facings(mesh, shapes, layer)
+        for way in ways:
+            needed = vertices if way.leaning is None else vertices[way.leaning[vertices]]
+            for table, pattern, world in (
+                *((t, t.pattern.directions, _NO_RAYS) for t in met.tables),
+                *(((lobes.transport, _NO_RAYS, lobes.directions),) if lobes.transport is not None else ()),
+            ):
+                hits = table.table
+                which = table.row_of[needed].astype(np.int64)
+                which = which[which >= 0]
+
+                def run(
+                    start: int,
+                    stop: int,
+                    which: I64 = which,
+                    table: Any = table,
+                    hits: Any = hits,
+                    pattern: F32 = pattern,
+                    world: F32 = world,
+                    way: Any = way,
+                ) -> None:
+                    gather_final(
+                        start,
+                        stop,
+                        float(cosine_rays),
+                        lobes.count,
+                        which,
+                        table.rows,
+                        table.variant,
+                        hits.vertex,
+                        hits.cell,
+                        pattern,
+                        world,
+                        mesh.positions,
+                        mesh.normals,
+                        mesh.tangents,
+                        way.mesh.normals,
+                        way.mesh.tangents,
+                        row,
+                        eye,
+                        shapes.address,
+                        shapes.terms,
+                        shapes.offset,
+                        shapes.data,
+                        lobes.lobes.density,
+                        lobes.lobes.peaked,
+                        separated.matte,
+                        sent.sources.light.matte,
+                        sent.surface.slot,
+                        separated.base,
+                        separated.count,
+                        separated.outgoing,
+                        sent.sources.light.functions,
+                        way.terms,
+                        way.irradiance,
+                    )
+
+                self._workers.run(len(which), CHUNK, run, job)
+            mask = np.zeros(len(wanted), np.bool_)
+            mask[needed] = True
+            given = (way.irradiance, met.tables[0], mask, spacing, mesh, neighbours, cosine_rays)
+            way.irradiance[:] = smoothed(*given, self._workers, job)
+
+            def flat(start: int, stop: int, needed: I64 = needed, way: Any = way) -> None:
+                add_flat_terms(start, stop, needed, row, separated.matte, way.irradiance, way.terms)
+
+            self._workers.run(len(needed), CHUNK, flat, job)
+        if layer.tilts is not None:
+            gather_tilts(shapes, mesh, ways, layer.tilts)
+        return self._told(inputs, layer, wanted, met, lobes.rays)
+
+    def _told(
+        self, inputs: Inputs, layer: LayerRadiance, wanted: Bools, met: Meetings, lobe_rays: int
+    ) -> Indirect:
+        inner, sent, tier = inputs[Meetings], inputs[Sent], inputs[Chosen].tier
+        traced = {
+            "rays_between_vertices": inner.rays if Meetings in inputs.rebuilt else 0,
+            "rays_of_receivers": met.rays,
+            "rays_of_lobes": lobe_rays,
+            "rays_to_lights": sent.rays if Sent in inputs.rebuilt else 0,
+            "receivers": int(wanted.sum()),
+        }
+        held = sum(table.nbytes for table in inner.tables) + self._tables.nbytes + self._lobes.nbytes
+        separated = inputs[Separated]
+        facts = {
+            "rays": float(sum(tier.final)),
+            "lobe_rays": float(tier.lobes),
+            "inner_rays": float(sum(tier.inner)),
+            "functions": float(separated.count.max(initial=0)),
+            "lobe_error": float(separated.error.max(initial=0)),
+            "steps": float(sent.sources.steps),
+            "bytes": float(held + sent.nbytes + separated.nbytes + self._neighbours.nbytes),
+        }
+        return Indirect(inputs[Surfaces], layer, wanted, tier.last, traced, facts)
+
+
+_NO_RAYS = np.zeros((0, 0, 3), np.float32)
+
+
+def _params(frame: Frame) -> Any:
+    assert frame.indirect is not None  # or nobody would run these stages
+    return frame.indirect.params
+
+
+def stages(services: Services) -> list[Any]:
+    """Fresh ones, in order."""
+    return [
+        TierStage(),
+        SeparateStage(),
+        ReflectingStage(services),
+        MeetingsStage(services),
+        SentStage(services),
+        FinalStage(services),
+    ]
+
+
+__all__ = ["Tier", "stages"]

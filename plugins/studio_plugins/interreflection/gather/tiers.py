@@ -1,0 +1,92 @@
+"""How many rays and functions: while somebody moves something, then at rest step by step."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+from studio_core.scene.diff import EVERYTHING, Aspect
+from studio_core.shading.frame import Frame
+from studio_core.shading.job import Job
+from studio_core.shading.pipeline import Inputs
+
+INNER, FINAL = 16, 64  # rays of a vertex, and of a receiver, in hand
+
+
+@dataclass(frozen=True)
+class Tier:
+    """Rays of a vertex, of a receiver and of its lobes; functions of a lobe as a source, with what tolerance;
+    samples of an area lamp and of the environment as sources. `last`: nothing finer was asked for."""
+
+    inner: tuple[int, ...]
+    final: tuple[int, ...]
+    lobes: int
+    functions: int
+    lobe_error: float
+    lamp_samples: int
+    environment_samples: int
+    last: bool = False
+
+
+@dataclass(frozen=True)
+class Chosen:
+    """The tier of this round; `level` counts from 0."""
+
+    tier: Tier
+    level: int
+
+
+def tiers(tolerance: float) -> tuple[Tier, ...]:
+    """In hand, then at rest: `tolerance` is the relative error of indirect light that is aimed at, in %."""
+    hand = Tier((INNER,), (FINAL,), 32, 16, 0.15, 16, 64)
+    fine = max(0, round(2 * math.log2(6.4 / max(tolerance, 0.1))))  # rays by the square of the error
+    if not fine:
+        return (replace(hand, last=True),)
+    made = [hand]
+    inner, final = (INNER,), (FINAL,)
+    for step in range(1, math.ceil(fine / 2) + 1):
+        inner = (*inner, 3 * inner_rays(inner)) if step <= 1 else inner
+        final = (*final, 3 * inner_rays(final))
+        made.append(Tier(inner, final, min(32 * 2**step, 128), 36, 0.05, 64, 256))
+    return (*made[:-1], replace(made[-1], last=True))
+
+
+def inner_rays(counts: tuple[int, ...]) -> int:
+    """In all."""
+    return sum(counts)
+
+
+class TierStage:
+    """The tier of this round: in hand after every change, the next after each round at rest."""
+
+    needs: tuple[type, ...] = ()
+    gives = Chosen
+    dirtied_by: Aspect = EVERYTHING
+
+    def __init__(self) -> None:
+        self._level = 0
+        self._before = 0
+
+    def run(self, frame: Frame, inputs: Inputs, job: Job) -> Chosen:
+        """The previous where the tier is the same."""
+        if inputs.changes or inputs.previous is None:
+            self._level = 0
+        offered = tiers(frame.indirect.params.tolerance) if frame.indirect is not None else tiers(100.0)
+        level = min(self._level, len(offered) - 1)
+        made = Chosen(offered[level], level)
+        previous: Chosen | None = inputs.previous
+        return previous if previous == made and previous is not None else made
+
+    def again(self, frame: Frame, made: Mapping[type, Any], rounds: int, job: Job) -> bool:
+        """Whether there is a finer one."""
+        self._before = self._level
+        if made[Chosen].tier.last:
+            return False
+        self._level = made[Chosen].level + 1
+        return True
+
+    def abandon(self) -> None:
+        """Back to the one before."""
+        self._level = self._before

@@ -1,0 +1,223 @@
+"""Light that goes from surface to surface, n times or until it settles.
+
+X ← B + T X: B is what surfaces send of the light that comes straight to them, T one bounce over kept hits.
+After n − 1 steps from X = B, X holds the light of n bounces' sources, B_0 + … + B_(n−1). In closed, bright
+rooms that takes long to settle; there each step is mixed with the last few so that what is left over is
+smallest (Anderson 1965, "Iterative Procedures for Nonlinear Integral Equations"): what all surfaces have in
+common, which plain steps change by the rooms' albedo alone, is found at once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from studio_core.parallel import Workers
+from studio_core.shading.job import Job
+from studio_core.transport.gather import gather_bounce, reflect
+from studio_core.transport.hits import HitTable
+from studio_core.transport.patterns import Pattern
+from studio_core.transport.separable import Separated
+
+F32 = npt.NDArray[np.float32]
+F64 = npt.NDArray[np.float64]
+I32 = npt.NDArray[np.int32]
+I64 = npt.NDArray[np.int64]
+
+CHUNK = 1 << 11
+HISTORY = 5
+SETTLED = 1e-4
+MOST_STEPS = 64
+
+
+class KeptRays(Protocol):
+    """Hits of cosine-distributed rays of some receivers (`operator.Transport`)."""
+
+    @property
+    def rows(self) -> I64:
+        """(R,) vertices."""
+        ...
+
+    @property
+    def table(self) -> HitTable:
+        """(R, N) hits."""
+        ...
+
+    @property
+    def variant(self) -> I32:
+        """(R,) which variant of the pattern each of them uses."""
+        ...
+
+    @property
+    def pattern(self) -> Pattern:
+        """Of its rays."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class Surface:
+    """How vertices send light back.
+
+    row (V,) of the separated BRDFs, −1: none; slot (V,) where a vertex' functions start in (S, 3), −1: none;
+    coefficients (V, T, 3) of the materials' terms.
+    """
+
+    row: I32
+    slot: I64
+    size: int
+    coefficients: F32
+    separated: Separated
+
+
+@dataclass(frozen=True, eq=False)
+class Light:
+    """What vertices receive or send: irradiance or matte radiance (V, 3), and functions (S, 3)."""
+
+    matte: F32
+    functions: F32
+
+    def __add__(self, other: Light) -> Light:
+        return Light(self.matte + other.matte, self.functions + other.functions)
+
+
+def reflected(received: Light, surface: Surface, workers: Workers, job: Job | None = None) -> Light:
+    """What is sent back of irradiance and of light weighted with the functions h_k."""
+    made = Light(np.empty_like(received.matte), np.empty_like(received.functions))
+    known = surface.separated
+
+    def run(start: int, stop: int) -> None:
+        reflect(
+            start,
+            stop,
+            received.matte,
+            received.functions,
+            surface.coefficients,
+            surface.slot,
+            surface.row,
+            known.matte,
+            known.count,
+            known.first,
+            known.term,
+            made.matte,
+            made.functions,
+        )
+
+    workers.run(len(received.matte), CHUNK, run, job)
+    return made
+
+
+def received(
+    sent: Light, tables: Sequence[KeptRays], surface: Surface, workers: Workers, job: Job | None = None
+) -> Light:
+    """What vertices receive of what others send, over all rays of all tables."""
+    made = Light(np.zeros_like(sent.matte), np.zeros_like(sent.functions))
+    known = surface.separated
+    scale = np.pi / sum(table.table.vertex.shape[1] for table in tables)
+    for table in tables:
+        hits = table.table
+
+        def run(start: int, stop: int, table: KeptRays = table, hits: HitTable = hits) -> None:
+            gather_bounce(
+                start,
+                stop,
+                scale,
+                table.rows,
+                table.variant,
+                hits.vertex,
+                hits.cell,
+                table.pattern.cells,
+                sent.matte,
+                surface.slot,
+                surface.row,
+                known.base,
+                known.count,
+                known.outgoing,
+                known.incoming,
+                sent.functions,
+                made.matte,
+                made.functions,
+            )
+
+        workers.run(len(table.rows), CHUNK, run, job)
+    return made
+
+
+@dataclass(frozen=True, eq=False)
+class Sources:
+    """What all vertices send after some bounces; `left` is the last step's change over all, relative."""
+
+    light: Light
+    steps: int
+    left: float = 0.0
+
+
+def bounced(
+    straight: Light,
+    bounces: int | None,
+    tables: Sequence[KeptRays],
+    surface: Surface,
+    workers: Workers,
+    job: Job | None = None,
+) -> Sources:
+    """Sources of so many bounces, or (None) of all: until a step changes less than `SETTLED` of the light.
+
+    `straight` is what vertices send of the light that comes straight to them.
+    """
+
+    def step(sent: Light) -> Light:
+        return straight + reflected(received(sent, tables, surface, workers, job), surface, workers, job)
+
+    if bounces is not None:
+        sent = straight
+        for _ in range(bounces - 1):
+            sent = step(sent)
+        return Sources(sent, bounces - 1)
+    return _settled(straight, step)
+
+
+class _Step(Protocol):
+    def __call__(self, sent: Light, /) -> Light: ...
+
+
+def _settled(straight: Light, step: _Step) -> Sources:
+    """Anderson's mixing; ends with a plain step, so that nothing that is sent was subtracted."""
+    count = straight.matte.size
+    sent, size = straight, max(float(np.abs(straight.matte).max(initial=0)), 1e-30)
+    changes: list[F64] = []
+    results: list[F32] = []
+    left = 0.0
+    for number in range(1, MOST_STEPS + 1):
+        following = step(sent)
+        before, after = _flat(sent), _flat(following)
+        change = (after - before).astype(np.float64)
+        size = max(size, float(np.abs(after[:count]).max(initial=0)))
+        left = float(np.abs(change[:count]).max(initial=0)) / size
+        if left < SETTLED:
+            return Sources(following, number, left)
+        changes, results = [*changes, change][-HISTORY:], [*results, after][-HISTORY:]
+        mixed = _mixed(changes, results)
+        sent = Light(mixed[:count].reshape(sent.matte.shape), mixed[count:].reshape(sent.functions.shape))
+    return Sources(step(sent), MOST_STEPS + 1, left)
+
+
+def _flat(light: Light) -> F32:
+    return np.concatenate([light.matte.ravel(), light.functions.ravel()])
+
+
+def _mixed(changes: list[F64], results: list[F32]) -> F32:
+    """Σ a_i results_i, Σ a_i = 1, with which Σ a_i changes_i is smallest."""
+    if len(changes) == 1:
+        return results[0]
+    last = changes[-1]
+    against = np.stack([last - change for change in changes[:-1]])
+    gram = against @ against.T
+    gram += 1e-12 * np.trace(gram) * np.eye(len(gram))
+    weights = np.linalg.solve(gram, against @ last)
+    made = (1 - weights.sum()) * results[-1]
+    for weight, result in zip(weights, results[:-1], strict=True):
+        made = made + weight * result
+    return made.astype(np.float32)

@@ -1,0 +1,155 @@
+"""What a surface receives from others: cached hits times what the vertices that they met send back.
+
+A vertex v sends matte radiance D[v] in all directions and Σ_k g_k(ω) L[v, k] beside it: a separated BRDF
+(`separable`). Kept hits name a vertex and the cell of the direction back, so light goes on from surface to
+surface without a ray: D and L at the receiver are sums over its row (Iwasaki et al. 2007, equations 3 and 4,
+with rays in the place of radiance fields).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from studio_core.jit import kernel
+from studio_core.transport.hits import BLACK
+
+F32 = npt.NDArray[np.float32]
+I32 = npt.NDArray[np.int32]
+I64 = npt.NDArray[np.int64]
+U16 = npt.NDArray[np.uint16]
+U32 = npt.NDArray[np.uint32]
+
+
+@kernel
+def sent(
+    vertex: int,
+    cell: int,
+    matte: F32,
+    slot: I64,
+    row: I32,
+    base: I64,
+    count: I64,
+    outgoing: F32,
+    functions: F32,
+) -> tuple[float, float, float]:
+    """Radiance of a vertex towards a cell of its own frame: D + Σ_k g_k L_k, never negative."""
+    red, green, blue = float(matte[vertex, 0]), float(matte[vertex, 1]), float(matte[vertex, 2])
+    first = slot[vertex]
+    if first >= 0:
+        r = row[vertex]
+        many = count[r]
+        g = base[r] + cell * many
+        for k in range(many):
+            weight = outgoing[g + k]
+            red += weight * functions[first + k, 0]
+            green += weight * functions[first + k, 1]
+            blue += weight * functions[first + k, 2]
+    return max(red, 0.0), max(green, 0.0), max(blue, 0.0)
+
+
+@kernel
+def gather_bounce(
+    start: int,
+    stop: int,
+    scale: float,
+    rows: I64,
+    variant: I32,
+    hit_vertex: U32,
+    hit_cell: U16,
+    ray_cell: U16,
+    matte: F32,
+    slot: I64,
+    row: I32,
+    base: I64,
+    count: I64,
+    outgoing: F32,
+    incoming: F32,
+    functions: F32,
+    irradiance: F32,
+    received: F32,
+) -> None:
+    """Adds to receivers rows[start:stop]: irradiance (V, 3), and received (S, 3) = Σ rays · h_k.
+
+    hit_vertex, hit_cell (R, N) of cosine-distributed rays of weight `scale` (π over how many there are in
+    all); ray_cell (P, N) the cells of the rays of every variant of the pattern, in the receiver's frame, and
+    variant (R,) the one of each row;
+    matte (V, 3), functions (S, 3) what vertices send; slot (V,) where a vertex' functions start in S, or −1;
+    row (V,) its row of the separated BRDFs, whose functions are base, count, outgoing and incoming.
+    """
+    many_rays = hit_vertex.shape[1]
+    sums = np.zeros(3 * 256)
+    for i in range(start, stop):
+        receiver = rows[i]
+        first = slot[receiver]
+        many, own = 0, 0
+        if first >= 0:
+            many, own = count[row[receiver]], base[row[receiver]]
+            for k in range(3 * many):
+                sums[k] = 0.0
+        red, green, blue = 0.0, 0.0, 0.0
+        for j in range(many_rays):
+            vertex = hit_vertex[i, j]
+            if vertex >= BLACK:
+                continue
+            r, g, b = sent(
+                np.int64(vertex), hit_cell[i, j], matte, slot, row, base, count, outgoing, functions
+            )
+            red += r
+            green += g
+            blue += b
+            h = own + np.int64(ray_cell[variant[i], j]) * many
+            for k in range(many):
+                weight = incoming[h + k]
+                sums[3 * k] += weight * r
+                sums[3 * k + 1] += weight * g
+                sums[3 * k + 2] += weight * b
+        irradiance[receiver, 0] += red * scale
+        irradiance[receiver, 1] += green * scale
+        irradiance[receiver, 2] += blue * scale
+        for k in range(many):
+            received[first + k, 0] += sums[3 * k] * scale
+            received[first + k, 1] += sums[3 * k + 1] * scale
+            received[first + k, 2] += sums[3 * k + 2] * scale
+
+
+@kernel
+def reflect(
+    start: int,
+    stop: int,
+    irradiance: F32,
+    received: F32,
+    coefficients: F32,
+    slot: I64,
+    row: I32,
+    matte_terms: F32,
+    count: I64,
+    first: I64,
+    term: I32,
+    matte: F32,
+    functions: F32,
+) -> None:
+    """What vertices start … stop−1 send back of what they receive.
+
+    D = Σ_t c_t m_t E with the constant terms m (R, T), L_k = c_t(k) · received_k; coefficients c (V, T, 3);
+    functions of row r are first[r] … in `term`. Written to matte (V, 3) and functions (S, 3).
+    """
+    terms = min(matte_terms.shape[1], coefficients.shape[1])
+    for v in range(start, stop):
+        r = row[v]
+        for c in range(3):
+            matte[v, c] = 0.0
+        if r < 0:
+            continue
+        for c in range(3):
+            albedo = 0.0
+            for t in range(terms):
+                albedo += matte_terms[r, t] * coefficients[v, t, c]
+            matte[v, c] = albedo * irradiance[v, c]
+        own = slot[v]
+        if own < 0:
+            continue
+        for k in range(count[r]):
+            t = term[first[r] + k]
+            for c in range(3):
+                functions[own + k, c] = coefficients[v, t, c] * received[own + k, c]
