@@ -9,6 +9,7 @@ common, which plain steps change by the rooms' albedo alone, is found at once.
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
@@ -18,6 +19,7 @@ import numpy.typing as npt
 
 from studio_core.parallel import Workers
 from studio_core.shading.job import Job
+from studio_core.transport.cells import cells_of
 from studio_core.transport.gather import gather_bounce, reflect
 from studio_core.transport.hits import HitTable
 from studio_core.transport.patterns import Pattern
@@ -75,7 +77,8 @@ class Surface:
 
 @dataclass(frozen=True, eq=False)
 class Light:
-    """What vertices receive or send: irradiance or matte radiance (V, 3), and functions (S, 3)."""
+    """What vertices receive, irradiance (V, 3) and functions (S, 3), or send: matte radiance and functions
+    (3 S,) in the order of `gather`."""
 
     matte: F32
     functions: F32
@@ -84,9 +87,17 @@ class Light:
         return Light(self.matte + other.matte, self.functions + other.functions)
 
 
+@functools.lru_cache(maxsize=16)
+def ray_cells(pattern: Pattern) -> npt.NDArray[np.uint16]:
+    """(P, N) the cell of each ray of a pattern."""
+    made = np.empty(pattern.directions.shape[:2], np.uint16)
+    cells_of(pattern.directions.reshape(-1, 3), made.reshape(-1))
+    return made
+
+
 def reflected(received: Light, surface: Surface, workers: Workers, job: Job | None = None) -> Light:
     """What is sent back of irradiance and of light weighted with the functions h_k."""
-    made = Light(np.empty_like(received.matte), np.empty_like(received.functions))
+    made = Light(np.empty_like(received.matte), np.empty(received.functions.size, np.float32))
     known = surface.separated
 
     def run(start: int, stop: int) -> None:
@@ -114,7 +125,7 @@ def received(
     sent: Light, tables: Sequence[KeptRays], surface: Surface, workers: Workers, job: Job | None = None
 ) -> Light:
     """What vertices receive of what others send, over all rays of all tables."""
-    made = Light(np.zeros_like(sent.matte), np.zeros_like(sent.functions))
+    made = Light(np.zeros_like(sent.matte), np.zeros((surface.size, 3), np.float32))
     known = surface.separated
     scale = np.pi / sum(table.table.vertex.shape[1] for table in tables)
     for table in tables:
@@ -129,7 +140,7 @@ def received(
                 table.variant,
                 hits.vertex,
                 hits.cell,
-                table.pattern.cells,
+                ray_cells(table.pattern),
                 sent.matte,
                 surface.slot,
                 surface.row,

@@ -16,6 +16,7 @@ from studio_core.jit import kernel
 from studio_core.kernels.directions import arctangent
 
 F32 = npt.NDArray[np.float32]
+U16 = npt.NDArray[np.uint16]
 
 RINGS, PARTS = 16, 64
 CELLS = RINGS * PARTS
@@ -42,6 +43,13 @@ def _angle(y: float, x: float) -> float:
     larger = max(x, y, 1e-30)
     made = float(arctangent(np.float32(min(x, y) / larger)))
     return math.pi / 2 - made if y > x else made
+
+
+@kernel
+def cells_of(directions: F32, out: U16) -> None:
+    """out (N,): the cells of unit directions (N, 3)."""
+    for i in range(len(directions)):
+        out[i] = cell_of(directions[i, 0], directions[i, 1], directions[i, 2])
 
 
 @functools.cache

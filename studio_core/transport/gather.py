@@ -1,7 +1,8 @@
 """What a surface receives from others: cached hits times what the vertices that they met send back.
 
-A vertex v sends matte radiance D[v] in all directions and Σ_k g_k(ω) L[v, k] beside it: a separated BRDF
-(`separable`). Kept hits name a vertex and the cell of the direction back, so light goes on from surface to
+A vertex v sends matte radiance D[v] in all directions and Σ_k g_k(ω) L[v, k] beside it, together never less
+than nothing: a separated BRDF (`separable`). D is (V, 3); L is flat, (3 S,), the functions of a vertex one
+colour after the other from 3 · slot on. Kept hits name a vertex and the cell of the direction back, so light goes on from surface to
 surface without a ray: D and L at the receiver are sums over its row (Iwasaki et al. 2007, equations 3 and 4,
 with rays in the place of radiance fields).
 """
@@ -20,32 +21,8 @@ I64 = npt.NDArray[np.int64]
 U16 = npt.NDArray[np.uint16]
 U32 = npt.NDArray[np.uint32]
 
-
-@kernel
-def sent(
-    vertex: int,
-    cell: int,
-    matte: F32,
-    slot: I64,
-    row: I32,
-    base: I64,
-    count: I64,
-    outgoing: F32,
-    functions: F32,
-) -> tuple[float, float, float]:
-    """Radiance of a vertex towards a cell of its own frame: D + Σ_k g_k L_k, never negative."""
-    red, green, blue = float(matte[vertex, 0]), float(matte[vertex, 1]), float(matte[vertex, 2])
-    first = slot[vertex]
-    if first >= 0:
-        r = row[vertex]
-        many = count[r]
-        g = base[r] + cell * many
-        for k in range(many):
-            weight = outgoing[g + k]
-            red += weight * functions[first + k, 0]
-            green += weight * functions[first + k, 1]
-            blue += weight * functions[first + k, 2]
-    return max(red, 0.0), max(green, 0.0), max(blue, 0.0)
+ZERO = np.float32(0.0)
+MOST = 256  # functions of a vertex
 
 
 @kernel
@@ -74,43 +51,53 @@ def gather_bounce(
     hit_vertex, hit_cell (R, N) of cosine-distributed rays of weight `scale` (π over how many there are in
     all); ray_cell (P, N) the cells of the rays of every variant of the pattern, in the receiver's frame, and
     variant (R,) the one of each row;
-    matte (V, 3), functions (S, 3) what vertices send; slot (V,) where a vertex' functions start in S, or −1;
+    matte (V, 3), functions (3 S,) what vertices send; slot (V,) where a vertex' functions start in S, or −1;
     row (V,) its row of the separated BRDFs, whose functions are base, count, outgoing and incoming.
     """
     many_rays = hit_vertex.shape[1]
-    sums = np.zeros(3 * 256)
+    sums = np.zeros((3, MOST), np.float32)
     for i in range(start, stop):
         receiver = rows[i]
         first = slot[receiver]
-        many, own = 0, 0
+        many, own = np.int64(0), np.int64(0)
         if first >= 0:
-            many, own = count[row[receiver]], base[row[receiver]]
-            for k in range(3 * many):
-                sums[k] = 0.0
-        red, green, blue = 0.0, 0.0, 0.0
+            many, own = min(count[row[receiver]], MOST), base[row[receiver]]
+        for k in range(many):
+            sums[0, k] = sums[1, k] = sums[2, k] = ZERO
+        red, green, blue = ZERO, ZERO, ZERO
         for j in range(many_rays):
-            vertex = hit_vertex[i, j]
+            vertex = np.int64(hit_vertex[i, j])
             if vertex >= BLACK:
                 continue
-            r, g, b = sent(
-                np.int64(vertex), hit_cell[i, j], matte, slot, row, base, count, outgoing, functions
-            )
+            r, g, b = matte[vertex, 0], matte[vertex, 1], matte[vertex, 2]
+            source = slot[vertex]
+            if source >= 0:  # also in the final gather: handing arrays to a helper costs 20 times the sum
+                its = count[row[vertex]]
+                at = base[row[vertex]] + np.int64(hit_cell[i, j]) * its
+                source *= 3
+                for k in range(its):
+                    weight = outgoing[at + k]
+                    r += weight * functions[source + k]
+                    g += weight * functions[source + its + k]
+                    b += weight * functions[source + 2 * its + k]
+                r, g, b = max(r, ZERO), max(g, ZERO), max(b, ZERO)
             red += r
             green += g
             blue += b
-            h = own + np.int64(ray_cell[variant[i], j]) * many
-            for k in range(many):
-                weight = incoming[h + k]
-                sums[3 * k] += weight * r
-                sums[3 * k + 1] += weight * g
-                sums[3 * k + 2] += weight * b
+            if many > 0:
+                at = own + np.int64(ray_cell[variant[i], j]) * many
+                for k in range(many):
+                    weight = incoming[at + k]
+                    sums[0, k] += weight * r
+                    sums[1, k] += weight * g
+                    sums[2, k] += weight * b
         irradiance[receiver, 0] += red * scale
         irradiance[receiver, 1] += green * scale
         irradiance[receiver, 2] += blue * scale
         for k in range(many):
-            received[first + k, 0] += sums[3 * k] * scale
-            received[first + k, 1] += sums[3 * k + 1] * scale
-            received[first + k, 2] += sums[3 * k + 2] * scale
+            received[first + k, 0] += sums[0, k] * scale
+            received[first + k, 1] += sums[1, k] * scale
+            received[first + k, 2] += sums[2, k] * scale
 
 
 @kernel
@@ -132,7 +119,7 @@ def reflect(
     """What vertices start … stop−1 send back of what they receive.
 
     D = Σ_t c_t m_t E with the constant terms m (R, T), L_k = c_t(k) · received_k; coefficients c (V, T, 3);
-    functions of row r are first[r] … in `term`. Written to matte (V, 3) and functions (S, 3).
+    functions of row r are first[r] … in `term`. Written to matte (V, 3) and functions (3 S,).
     """
     terms = min(matte_terms.shape[1], coefficients.shape[1])
     for v in range(start, stop):
@@ -152,4 +139,4 @@ def reflect(
         for k in range(count[r]):
             t = term[first[r] + k]
             for c in range(3):
-                functions[own + k, c] = coefficients[v, t, c] * received[own + k, c]
+                functions[3 * own + c * count[r] + k] = coefficients[v, t, c] * received[own + k, c]

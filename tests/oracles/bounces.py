@@ -16,7 +16,8 @@ def sent(vertex, cell, light, surface):
         row = surface.row[vertex]
         count, base = known.count[row], known.base[row]
         g = known.outgoing[base + cell * count : base + (cell + 1) * count].astype(np.float64)
-        made = made + g @ light.functions[first : first + count].astype(np.float64)
+        own = light.functions[3 * first : 3 * (first + count)].reshape(3, count)
+        made = made + own.astype(np.float64) @ g
     return np.maximum(made, 0)
 
 
@@ -24,7 +25,7 @@ def received(light, rows, hits, ray_cells, variants, surface):
     """Irradiance (V, 3) and functions (S, 3) over rays that stand for π / N each; variants (R,) of the rows."""
     known = surface.separated
     irradiance = np.zeros(light.matte.shape)
-    functions = np.zeros(light.functions.shape)
+    functions = np.zeros((surface.size, 3))
     scale = np.pi / hits.vertex.shape[1]
     for i, receiver in enumerate(rows):
         for j, vertex in enumerate(hits.vertex[i]):
@@ -43,9 +44,9 @@ def received(light, rows, hits, ray_cells, variants, surface):
 
 
 def reflected(irradiance, functions, surface):
-    """Matte radiance (V, 3) and functions (S, 3) that are sent back."""
+    """Matte radiance (V, 3) and functions (3 S,) that are sent back."""
     known = surface.separated
-    matte, back = np.zeros(irradiance.shape), np.zeros(functions.shape)
+    matte, back = np.zeros(irradiance.shape), np.zeros(functions.size)
     for v, row in enumerate(surface.row):
         if row < 0:
             continue
@@ -54,7 +55,8 @@ def reflected(irradiance, functions, surface):
         matte[v] = albedo * irradiance[v]
         first = surface.slot[v]
         if first >= 0:
-            for k in range(known.count[row]):
-                term = known.term[known.first[row] + k]
-                back[first + k] = surface.coefficients[v, term] * functions[first + k]
+            count = known.count[row]
+            term = known.term[known.first[row] : known.first[row] + count]
+            own = surface.coefficients[v, term] * functions[first : first + count]
+            back[3 * first : 3 * (first + count)] = own.T.ravel()
     return matte, back

@@ -80,7 +80,7 @@ class Setting:
         none, zero = np.zeros(0, np.float32), np.zeros(1, np.int64)
         brdf = (np.array([self.model.address]), np.array([self.model.terms]), zero, self.shape)
         lobes = (np.array([self.model.density]), self.peaked, np.zeros((1, self.model.terms), np.float32))
-        sources = (radiance, np.full(len(radiance), -1), zero, zero, none, np.zeros((0, 3), np.float32))
+        sources = (radiance, np.full(len(radiance), -1), zero, zero, none, none)
         for hits, pattern, world in (
             (of_cosine, self.pattern.directions, NONE),
             (of_lobes, NONE, self.directions),

@@ -12,7 +12,6 @@ import numpy.typing as npt
 
 from studio_core.jit import call_address, kernel
 from studio_core.kernels.radiance import local_view, surface_frame
-from studio_core.transport.gather import sent
 from studio_core.transport.hits import BLACK
 
 F32 = npt.NDArray[np.float32]
@@ -23,6 +22,7 @@ U32 = npt.NDArray[np.uint32]
 Bools = npt.NDArray[np.bool_]
 
 INV_PI = 1.0 / np.pi
+ZERO = np.float32(0.0)
 
 
 @kernel
@@ -86,12 +86,21 @@ def gather_final(
         surface_frame(leaning_normals[v], leaning_tangents[v], axes)
         some = 0
         for j in range(many):
-            vertex = hit_vertex[i, j]
+            vertex = np.int64(hit_vertex[i, j])
             if vertex >= BLACK:
                 continue
-            red, green, blue = sent(
-                np.int64(vertex), hit_cell[i, j], matte, slot, row, base, count, outgoing, functions
-            )
+            red, green, blue = matte[vertex, 0], matte[vertex, 1], matte[vertex, 2]
+            source = slot[vertex]
+            if source >= 0:  # as in `transport.gather`
+                its = count[row[vertex]]
+                at = base[row[vertex]] + np.int64(hit_cell[i, j]) * its
+                source *= 3
+                for k in range(its):
+                    share = outgoing[at + k]
+                    red += share * functions[source + k]
+                    green += share * functions[source + its + k]
+                    blue += share * functions[source + 2 * its + k]
+                red, green, blue = max(red, ZERO), max(green, ZERO), max(blue, ZERO)
             if drawn:
                 x, y, z = world[i, j, 0], world[i, j, 1], world[i, j, 2]
             else:

@@ -40,7 +40,7 @@ class Chosen:
 
 def tiers(tolerance: float) -> tuple[Tier, ...]:
     """In hand, then at rest: `tolerance` is the relative error of indirect light that is aimed at, in %."""
-    hand = Tier((INNER,), (FINAL,), 32, 16, 0.15, 16, 64)
+    hand = Tier((INNER,), (FINAL,), 32, 16, 0.15, 4, 64)
     fine = max(0, round(2 * math.log2(6.4 / max(tolerance, 0.1))))  # rays by the square of the error
     if not fine:
         return (replace(hand, last=True),)
@@ -49,7 +49,7 @@ def tiers(tolerance: float) -> tuple[Tier, ...]:
     for step in range(1, math.ceil(fine / 2) + 1):
         inner = (*inner, 3 * inner_rays(inner)) if step <= 1 else inner
         final = (*final, 3 * inner_rays(final))
-        made.append(Tier(inner, final, min(32 * 2**step, 128), 36, 0.05, 64, 256))
+        made.append(Tier(inner, final, min(32 * 2**step, 128), 36, 0.05, 16, 256))
     return (*made[:-1], replace(made[-1], last=True))
 
 
