@@ -20,7 +20,7 @@ import numpy.typing as npt
 from studio_core.parallel import Workers
 from studio_core.shading.job import Job
 from studio_core.transport.cells import cells_of
-from studio_core.transport.gather import gather_bounce, reflect
+from studio_core.transport.gather import gather_bounce, reflect, uncover
 from studio_core.transport.hits import HitTable
 from studio_core.transport.patterns import Pattern
 from studio_core.transport.separable import Separated
@@ -61,6 +61,34 @@ class KeptRays(Protocol):
 
 
 @dataclass(frozen=True, eq=False)
+class Covered:
+    """Vertices (C,) that something stands on, and which others (C, N) next to them are free, with weights.
+
+    Rays meet faces beside a thing that stands on them: their covered corners are dark, and would darken what
+    is free. −1 among the others ends a row.
+    """
+
+    vertices: I64
+    others: I32
+    weights: F32
+
+    @classmethod
+    def of(cls, inside: npt.NDArray[np.bool_], positions: F32, neighbours: I32) -> Covered:
+        """Of vertices whose rays start `inside` (V,) closed things; neighbours (V, N), the nearest first."""
+        vertices = np.flatnonzero(inside)
+        near = neighbours[vertices]
+        free = (near >= 0) & ~inside[near]
+        order = np.argsort(~free, axis=1, kind="stable")
+        near, free = np.take_along_axis(near, order, axis=1), np.take_along_axis(free, order, axis=1)
+        away = ((positions[near] - positions[vertices][:, None]) ** 2).sum(axis=2, dtype=np.float64)
+        weights = np.where(free, 1 / np.maximum(away, 1e-12), 0)
+        weights /= np.maximum(weights.sum(axis=1, keepdims=True), 1e-30)
+        known = free.any(axis=1)
+        others = np.where(free, near, -1).astype(np.int32)
+        return cls(vertices[known], others[known], weights[known].astype(np.float32))
+
+
+@dataclass(frozen=True, eq=False)
 class Surface:
     """How vertices send light back.
 
@@ -73,6 +101,7 @@ class Surface:
     size: int
     coefficients: F32
     separated: Separated
+    covered: Covered | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,7 +125,11 @@ def ray_cells(pattern: Pattern) -> npt.NDArray[np.uint16]:
 
 
 def reflected(received: Light, surface: Surface, workers: Workers, job: Job | None = None) -> Light:
-    """What is sent back of irradiance and of light weighted with the functions h_k."""
+    """What is sent back of irradiance and of light weighted with the functions h_k.
+
+    What covered vertices receive is written over.
+    """
+    _uncover(received, surface)
     made = Light(np.empty_like(received.matte), np.empty(received.functions.size, np.float32))
     known = surface.separated
 
@@ -119,6 +152,14 @@ def reflected(received: Light, surface: Surface, workers: Workers, job: Job | No
 
     workers.run(len(received.matte), CHUNK, run, job)
     return made
+
+
+def _uncover(received: Light, surface: Surface) -> None:
+    covered, known = surface.covered, surface.separated
+    if covered is not None:
+        of_rows = (surface.slot, surface.row, known.count, received.matte, received.functions)
+        count = len(covered.vertices)
+        uncover(0, count, covered.vertices, covered.others, covered.weights, *of_rows)
 
 
 def received(

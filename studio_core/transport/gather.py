@@ -2,9 +2,9 @@
 
 A vertex v sends matte radiance D[v] in all directions and Σ_k g_k(ω) L[v, k] beside it, together never less
 than nothing: a separated BRDF (`separable`). D is (V, 3); L is flat, (3 S,), the functions of a vertex one
-colour after the other from 3 · slot on. Kept hits name a vertex and the cell of the direction back, so light goes on from surface to
-surface without a ray: D and L at the receiver are sums over its row (Iwasaki et al. 2007, equations 3 and 4,
-with rays in the place of radiance fields).
+colour after the other from 3 · slot on. Kept hits name a vertex and the cell of the direction back, so light
+goes on from surface to surface without a ray: D and L at the receiver are sums over its row (Iwasaki et al.
+2007, equations 3 and 4, with rays in the place of radiance fields).
 """
 
 from __future__ import annotations
@@ -140,3 +140,58 @@ def reflect(
             t = term[first[r] + k]
             for c in range(3):
                 functions[3 * own + c * count[r] + k] = coefficients[v, t, c] * received[own + k, c]
+
+
+@kernel
+def uncover(
+    start: int,
+    stop: int,
+    covered: I64,
+    others: I32,
+    weights: F32,
+    slot: I64,
+    row: I32,
+    count: I64,
+    irradiance: F32,
+    received: F32,
+) -> None:
+    """Vertices covered[start:stop] receive what their neighbours others (C, N) do, as much as weights say.
+
+    −1 among the others ends a row. Functions are taken over from neighbours of the same row of BRDFs.
+    """
+    for i in range(start, stop):
+        v = covered[i]
+        red, green, blue, total = ZERO, ZERO, ZERO, ZERO
+        for n in range(others.shape[1]):
+            u = others[i, n]
+            if u < 0:
+                break
+            red += weights[i, n] * irradiance[u, 0]
+            green += weights[i, n] * irradiance[u, 1]
+            blue += weights[i, n] * irradiance[u, 2]
+            total += weights[i, n]
+        if total <= ZERO:
+            continue
+        irradiance[v, 0], irradiance[v, 1], irradiance[v, 2] = red / total, green / total, blue / total
+        first = slot[v]
+        if first < 0:
+            continue
+        total = ZERO
+        many = count[row[v]]
+        for k in range(many):
+            for c in range(3):
+                received[first + k, c] = ZERO
+        for n in range(others.shape[1]):
+            u = others[i, n]
+            if u < 0:
+                break
+            if row[u] != row[v]:
+                continue
+            total += weights[i, n]
+            for k in range(many):
+                for c in range(3):
+                    received[first + k, c] += weights[i, n] * received[slot[u] + k, c]
+        if total > ZERO:
+            for k in range(many):
+                for c in range(3):
+                    received[first + k, c] /= total

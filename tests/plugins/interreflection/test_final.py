@@ -69,9 +69,7 @@ class Setting:
         offset, sampler = np.zeros(1, np.int64), np.array([self.model.sampler])
         for i in range(self.count):
             given = (self.rows, self.variant, self.positions, *self.frames, self.row, self.eye(i))
-            draw_lobes(
-                i, i + 1, *given, offset, self.shape, sampler, self.peaked, numbers, self.directions
-            )
+            draw_lobes(i, i + 1, *given, offset, self.shape, sampler, self.peaked, numbers, self.directions)
 
     def gather(self, radiance: np.ndarray, of_cosine: HitTable, of_lobes: HitTable) -> tuple[Any, Any]:
         """Terms and irradiance, where each vertex of `radiance` (V, 3) is matte."""

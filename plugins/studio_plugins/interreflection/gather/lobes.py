@@ -29,7 +29,7 @@ _VIEWS = np.array([[np.sin(a), 0, np.cos(a)] for a in np.radians([5.0, 45.0, 70.
 
 @dataclass(frozen=True, eq=False)
 class Lobes:
-    """Of each row of shapes: addresses of `sample` and `density`, 0 without; which terms are peaked (R, T)."""
+    """Of each row of shapes: addresses of `sample` and `density` (0: none); which terms are peaked (R, T)."""
 
     sampler: I64
     density: I64
@@ -74,7 +74,7 @@ class LobeTable:
 
 
 def used_share(address: int, terms: int, shape: F32) -> F64:
-    """(terms,) (∫ b cosθ)² / (π ∫ b² cosθ) at the least of three views: 1 for a constant, little for a peak."""
+    """(terms,) the least (∫ b cosθ)² / (π ∫ b² cosθ) of three views: 1 for a constant, little for a peak."""
     shape = shape if len(shape) else np.zeros(1, np.float32)
     wi, weight = np.ascontiguousarray(cell_directions().T).ravel(), cell_projected_angles()
     least = np.ones(terms)
@@ -113,7 +113,8 @@ def draw_lobes(
 ) -> None:
     """Directions (G, N, 3), in the world, of receivers rows[start:stop]: their peaked terms in turn.
 
-    numbers (P, T, N, 2) in [0, 1): for each variant and term evenly spread; variant (R,) of each receiver. (0, 0, 0) where none is found.
+    numbers (P, T, N, 2) in [0, 1): for each variant and term evenly spread; variant (R,) of each receiver.
+    (0, 0, 0) where none is found.
     """
     many = directions.shape[1]
     axes = np.empty((3, 3))

@@ -16,9 +16,7 @@ class Params:
     """Parameters of the gather."""
 
     bounces: int = param(3, "Bounces", "How often light goes on from surface to surface", low=1, high=16)
-    settle: bool = param(
-        False, "Until it settles", "As many bounces as matter: for closed, bright rooms"
-    )
+    settle: bool = param(False, "Until it settles", "As many bounces as matter: for closed, bright rooms")
     tolerance: float = param(
         3.0,
         "Accuracy",

@@ -8,6 +8,7 @@ the wall, vertices see the cabinet from within, and would darken the wall beside
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Protocol
@@ -20,10 +21,11 @@ from studio_core.parallel import Workers
 from studio_core.scene.shading_mesh import ShadingMesh
 from studio_core.scene.world_mesh import WorldMesh
 from studio_core.shading.job import Job
-from studio_core.transport.hits import BLACK, HitTable
+from studio_core.transport.hits import HitTable
 
 F32 = npt.NDArray[np.float32]
 I32 = npt.NDArray[np.int32]
+U16 = npt.NDArray[np.uint16]
 I64 = npt.NDArray[np.int64]
 Bools = npt.NDArray[np.bool_]
 
@@ -36,7 +38,7 @@ CHUNK = 1 << 11
 
 
 def nearest(mesh: ShadingMesh) -> I32:
-    """(V, NEIGHBOURS) the nearest other vertices of the same side and material slot; −1 where there are fewer.
+    """(V, NEIGHBOURS) the nearest other vertices of the same side and material; −1 where there are fewer.
 
     Distances count normals too: vertices at one place on two sides of a crease are not neighbours.
     """
@@ -44,7 +46,8 @@ def nearest(mesh: ShadingMesh) -> I32:
 
     count = len(mesh)
     size = float(np.linalg.norm(np.ptp(mesh.positions, axis=0))) if count else 0.0
-    places = np.concatenate([mesh.positions, mesh.normals * np.float32(size)], axis=1)
+    apart = [mesh.normals, mesh.slot[:, None].astype(np.float32)]
+    places = np.concatenate([mesh.positions, *(size * other for other in apart)], axis=1)
     tree = cKDTree(places)
     wanted = min(NEIGHBOURS + 1, count)
     found = np.full((count, NEIGHBOURS), -1, np.int32)
@@ -66,9 +69,9 @@ class Neighbours:
     def __call__(self, mesh: WorldMesh) -> I32:
         """(V, NEIGHBOURS) vertices of the world mesh, −1: none."""
         parts = tuple(placed.mesh for placed in mesh.objects)
-        if self._joined is not None and len(self._joined[0]) == len(parts):
-            if all(a is b for a, b in zip(self._joined[0], parts, strict=True)):
-                return self._joined[1]
+        before = self._joined
+        if before is not None and [*map(id, before[0])] == [*map(id, parts)]:
+            return before[1]
         kept: dict[int, tuple[ShadingMesh, I32]] = {}
         for part in parts:
             known = self._kept.get(id(part))
@@ -149,7 +152,7 @@ def share_light(
 
 
 class KeptReceivers(Protocol):
-    """Which vertices have kept rays: `rows` (R,), and where each vertex stands in it, `row_of` (V,), or −1."""
+    """Which vertices have kept rays: `rows` (R,), where each vertex stands in it, `row_of` (V,), or −1."""
 
     @property
     def rows(self) -> I64:
@@ -161,6 +164,37 @@ class KeptReceivers(Protocol):
         """(V,)."""
         ...
 
+    @property
+    def table(self) -> HitTable:
+        """Hits."""
+        ...
+
+    @property
+    def share_back(self) -> F32:
+        """(R,) share of rays that met insides."""
+        ...
+
+
+@functools.cache
+def _nearness() -> F32:
+    """(2^16,) 1 / distance by the bits of float16; 0 of what is infinitely far."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        made = 1 / np.maximum(np.arange(1 << 16, dtype=np.uint16).view(np.float16).astype(np.float32), 1e-6)
+    made[~np.isfinite(made)] = 0
+    return made
+
+
+@kernel
+def harmonic_means(start: int, stop: int, bits: U16, nearness: F32, out: F32) -> None:
+    """out (R,) of rows start … stop−1: of the rays that met something, the harmonic mean length; else inf."""
+    for i in range(start, stop):
+        met, near = 0, np.float32(0.0)
+        for j in range(bits.shape[1]):
+            one = nearness[bits[i, j]]
+            near += one
+            met += 1 if one > 0 else 0
+        out[i] = met / near if near > 0 else np.inf
+
 
 @dataclass(frozen=True, eq=False)
 class Spacing:
@@ -170,14 +204,15 @@ class Spacing:
     inside: F32
 
     @classmethod
-    def of(cls, hits: HitTable) -> Spacing:
-        """From kept hits; infinitely far where nothing was met."""
-        met = hits.vertex < BLACK
-        with np.errstate(divide="ignore"):
-            near = np.where(met, 1 / np.maximum(hits.distance.astype(np.float32), 1e-6), 0)
-            length = met.sum(axis=1) / near.sum(axis=1)
-        inside = (hits.vertex == BLACK).mean(axis=1)
-        return cls(np.nan_to_num(length, nan=np.inf).astype(np.float32), inside.astype(np.float32))
+    def of(cls, kept: KeptReceivers, workers: Workers, job: Job | None = None) -> Spacing:
+        """From kept hits."""
+        bits, length = kept.table.distance.view(np.uint16), np.empty(len(kept.rows), np.float32)
+
+        def run(start: int, stop: int) -> None:
+            harmonic_means(start, stop, bits, _nearness(), length)
+
+        workers.run(len(length), CHUNK, run, job)
+        return cls(length, kept.share_back)
 
 
 def smoothed(

@@ -26,7 +26,7 @@ from studio_core.shading.job import Job
 from studio_core.shading.kept import Kept
 from studio_core.shading.pipeline import Inputs
 from studio_core.shading.tilting import facings, gather_tilts
-from studio_core.transport.bounces import Light, Sources, Surface, bounced, reflected
+from studio_core.transport.bounces import Covered, Light, Sources, Surface, bounced, reflected
 from studio_core.transport.operator import Transport
 from studio_core.transport.patterns import cosine_pattern
 from studio_core.transport.reflectance import VertexCoefficients
@@ -41,6 +41,7 @@ F32 = npt.NDArray[np.float32]
 I64 = npt.NDArray[np.int64]
 Bools = npt.NDArray[np.bool_]
 CHUNK = 1 << 9
+COVERED = 0.5  # share of rays that meet insides, above which a vertex counts as covered
 INNER_SEED, FINAL_SEED = 1000, 2000  # apart: what receivers meet must not be what chose the sources' light
 
 
@@ -175,9 +176,11 @@ class SentStage:
     gives = Sent
     dirtied_by = Aspect.GAIN | Aspect.LIGHT | Aspect.QUALITY
 
-    def __init__(self, services: Services) -> None:
+    def __init__(self, services: Services, neighbours: Neighbours) -> None:
         self._workers = services.workers
         self._light = SourceLight(services.workers)
+        self._neighbours = neighbours
+        self._covered: Kept[Covered] = Kept()
 
     def run(self, frame: Frame, inputs: Inputs, job: Job) -> Sent:
         """All bounces that were asked for."""
@@ -187,12 +190,19 @@ class SentStage:
         counted = self._light.update(surfaces, inputs[Casters], inputs[Lighting], samples, job)
         lights = {n.id: n for n in frame.scene.of(LightNode) if frame.scene.shown(n.id)}
         irradiance, slot, functions = self._light.sums(surfaces, shapes, separated, lights, None, job)
+        met = inputs[Meetings]
+        covered = self._covered(lambda: _covered(met, surfaces, self._neighbours(surfaces.mesh)), met)
         surface = Surface(
-            shapes.rows(surfaces.mesh), slot, len(functions), inputs[Reflecting].coefficients, separated
+            shapes.rows(surfaces.mesh),
+            slot,
+            len(functions),
+            inputs[Reflecting].coefficients,
+            separated,
+            covered,
         )
         straight = reflected(Light(irradiance, functions), surface, self._workers, job)
         bounces = None if params.settle else params.bounces
-        made = bounced(straight, bounces, inputs[Meetings].tables, surface, self._workers, job)
+        made = bounced(straight, bounces, met.tables, surface, self._workers, job)
         nbytes = self._light.nbytes + made.light.matte.nbytes + made.light.functions.nbytes
         return Sent(made, surface, counted.rays, nbytes)
 
@@ -213,11 +223,11 @@ class FinalStage:
     gives = Indirect
     dirtied_by = Aspect.VIEW
 
-    def __init__(self, services: Services) -> None:
+    def __init__(self, services: Services, neighbours: Neighbours) -> None:
         self._workers = services.workers
         self._tables = _Tables(services, FINAL_SEED)
         self._lobes = LobeRays(services)
-        self._neighbours = Neighbours()
+        self._neighbours = neighbours
         self._spacing: Kept[Spacing] = Kept()
         self._meetings: Meetings | None = None
 
@@ -228,12 +238,10 @@ class FinalStage:
         wanted, casters = receivers.seen, inputs[Casters]
         met = self._tables(chosen.tier.final, surfaces, casters, wanted, self._meetings, job)
         self._meetings = met
-        lobes = self._lobes.update(
-            frame.scene, surfaces, casters, shapes, receivers, chosen.tier.lobes, job
-        )
+        lobes = self._lobes.update(frame.scene, surfaces, casters, shapes, receivers, chosen.tier.lobes, job)
         layer = blank_layer(mesh, shapes)
         cosine_rays = sum(chosen.tier.final)
-        spacing = self._spacing(lambda: Spacing.of(met.tables[0].table), met)
+        spacing = self._spacing(lambda: Spacing.of(met.tables[0], self._workers, job), met)
         neighbours = self._neighbours(mesh)
         eye = (receivers.eye - mesh.origin).astype(np.float32)
         row, separated = shapes.rows(mesh), inputs[Separated]
@@ -334,6 +342,14 @@ class FinalStage:
         return Indirect(inputs[Surfaces], layer, wanted, tier.last, traced, facts)
 
 
+def _covered(met: Meetings, surfaces: Surfaces, neighbours: npt.NDArray[np.int32]) -> Covered:
+    """Vertices most of whose rays meet insides; those without a ray are free."""
+    first, mesh = met.tables[0], surfaces.mesh
+    inside = np.zeros(len(mesh.positions), np.bool_)
+    inside[first.rows] = first.share_back > COVERED
+    return Covered.of(inside, mesh.positions, neighbours)
+
+
 _NO_RAYS = np.zeros((0, 0, 3), np.float32)
 
 
@@ -344,13 +360,14 @@ def _params(frame: Frame) -> Any:
 
 def stages(services: Services) -> list[Any]:
     """Fresh ones, in order."""
+    neighbours = Neighbours()
     return [
         TierStage(),
         SeparateStage(),
         ReflectingStage(services),
         MeetingsStage(services),
-        SentStage(services),
-        FinalStage(services),
+        SentStage(services, neighbours),
+        FinalStage(services, neighbours),
     ]
 
 
