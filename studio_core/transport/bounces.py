@@ -267,9 +267,8 @@ def _mixed(changes: list[F64], results: list[F32]) -> F32:
     last = changes[-1]
     against = np.stack([last - change for change in changes[:-1]])
     gram = against @ against.T
-    gram += 1e-12 * np.trace(gram) * np.eye(len(gram))
-    weights = np.linalg.solve(gram, against @ last)
+    weights = np.linalg.lstsq(gram, against @ last, rcond=1e-12)[0]
     made = (1 - weights.sum()) * results[-1]
     for weight, result in zip(weights, results[:-1], strict=True):
         made = made + weight * result
-    return made.astype(np.float32)
+    return np.asarray(made, np.float32)

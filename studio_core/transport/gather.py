@@ -61,7 +61,7 @@ def gather_bounce(
         first = slot[receiver]
         many, own = np.int64(0), np.int64(0)
         if first >= 0:
-            many, own = min(count[row[receiver]], MOST), base[row[receiver]]
+            many, own = np.int64(min(count[row[receiver]], MOST)), base[row[receiver]]
         for k in range(many):
             sums[0, k] = sums[1, k] = sums[2, k] = ZERO
         red, green, blue = ZERO, ZERO, ZERO

@@ -22,7 +22,7 @@ def sent(vertex, cell, light, surface):
 
 
 def received(light, rows, hits, ray_cells, variants, surface):
-    """Irradiance (V, 3) and functions (S, 3) over rays that stand for π / N each; variants (R,) of the rows."""
+    """Irradiance (V, 3) and functions (S, 3) over rays that stand for π / N each; variants (R,)."""
     known = surface.separated
     irradiance = np.zeros(light.matte.shape)
     functions = np.zeros((surface.size, 3))

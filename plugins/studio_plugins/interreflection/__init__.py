@@ -6,4 +6,9 @@
 
 from studio_core.contract import API, Plugin
 
-plugin = Plugin(id="interreflection", label="Light between surfaces", api=API, provides={})
+plugin = Plugin(
+    id="interreflection",
+    label="Light between surfaces",
+    api=API,
+    provides={"indirect": {"gather": "studio_plugins.interreflection.gather.method:METHOD"}},
+)

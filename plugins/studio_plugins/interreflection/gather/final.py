@@ -64,9 +64,10 @@ def gather_final(
     """Adds terms (V, T, 3) that are not flat, and irradiance (V, 3), of receivers rows[which[start:stop]].
 
     hit_vertex, hit_cell (R, N) are what rays met: of the pattern's variants (P, N, 3), variant (R,) of each
-    row, or, where that is empty, along `world` (R, N, 3). by_cosine = N_c and by_lobes = N_l are how many there
-    are of each kind in all; rows without a peaked term have no rays by lobes. Light is weighed as surfaces with
-    the leaning normals and tangents do; flat (R, T) are kernels' values that are constant (0: they are not).
+    row, or, where that is empty, along `world` (R, N, 3). by_cosine = N_c and by_lobes = N_l are how many
+    there are of each kind in all; rows without a peaked term have no rays by lobes. Light is weighed as
+    surfaces with the leaning normals and tangents do; flat (R, T) are kernels' values that are constant (0:
+    they are not).
     """
     many = hit_vertex.shape[1]
     drawn = len(world) > 0

@@ -110,4 +110,4 @@ def spread_numbers(variants: int, terms: int, count: int, seed: int) -> F32:
     steps = np.array([0.7548776662466927, 0.5698402909980532])
     shift = np.random.default_rng(seed).random((variants, terms, 1, 2))
     made = (shift + (np.arange(count) + 0.5)[:, None] * steps) % 1.0
-    return np.minimum(made, 1 - 2.0**-24).astype(np.float32)
+    return np.asarray(np.minimum(made, 1 - 2.0**-24), np.float32)

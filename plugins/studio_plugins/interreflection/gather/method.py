@@ -22,7 +22,7 @@ class Params:
         "Accuracy",
         "Error of the light between surfaces that is aimed at when nothing moves",
         unit="%",
-        low=0.5,
+        low=1.5,
         high=10.0,
         scale="log",
     )

@@ -178,10 +178,10 @@ class KeptReceivers(Protocol):
 @functools.cache
 def _nearness() -> F32:
     """(2^16,) 1 / distance by the bits of float16; 0 of what is infinitely far."""
-    with np.errstate(divide="ignore", invalid="ignore"):
-        made = 1 / np.maximum(np.arange(1 << 16, dtype=np.uint16).view(np.float16).astype(np.float32), 1e-6)
-    made[~np.isfinite(made)] = 0
-    return made
+    with np.errstate(invalid="ignore"):
+        length = np.arange(1 << 16, dtype=np.uint16).view(np.float16).astype(np.float64)
+    known = length >= 0  # neither negative nor no number
+    return np.where(known, 1 / np.maximum(np.where(known, length, 1), 1e-6), 0).astype(np.float32)
 
 
 @kernel

@@ -27,11 +27,12 @@ from studio_core.shading.kept import Kept
 from studio_core.shading.pipeline import Inputs
 from studio_core.shading.tilting import facings, gather_tilts
 from studio_core.transport.bounces import Covered, Light, Sources, Surface, bounced, reflected
+from studio_core.transport.light_samples import SampleCounts
 from studio_core.transport.operator import Transport
 from studio_core.transport.patterns import cosine_pattern
 from studio_core.transport.reflectance import VertexCoefficients
 from studio_core.transport.separable import Separated, Separator
-from studio_core.transport.source_light import SampleCounts, SourceLight
+from studio_core.transport.source_light import SourceLight
 from studio_plugins.interreflection.gather.final import add_flat_terms, gather_final
 from studio_plugins.interreflection.gather.lobe_rays import LobeRays
 from studio_plugins.interreflection.gather.smooth import Neighbours, Spacing, smoothed

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
@@ -11,8 +10,6 @@ from studio_core.scene.diff import EVERYTHING, Aspect
 from studio_core.shading.frame import Frame
 from studio_core.shading.job import Job
 from studio_core.shading.pipeline import Inputs
-
-INNER, FINAL = 16, 64  # rays of a vertex, and of a receiver, in hand
 
 
 @dataclass(frozen=True)
@@ -38,24 +35,21 @@ class Chosen:
     level: int
 
 
+HAND = Tier((16,), (64,), 32, 16, 0.15, 4, 64)
+REST = Tier((16, 48), (64, 192), 64, 36, 0.05, 16, 256)
+FINE = Tier((16, 48), (64, 192, 768), 128, 36, 0.05, 16, 1024)
+ENOUGH_IN_HAND, ENOUGH_AT_REST = 6.0, 2.5
+"""Errors of indirect light, %, that these have in most rooms (docs/interreflection.md)."""
+
+
 def tiers(tolerance: float) -> tuple[Tier, ...]:
     """In hand, then at rest: `tolerance` is the relative error of indirect light that is aimed at, in %."""
-    hand = Tier((INNER,), (FINAL,), 32, 16, 0.15, 4, 64)
-    fine = max(0, round(2 * math.log2(6.4 / max(tolerance, 0.1))))  # rays by the square of the error
-    if not fine:
-        return (replace(hand, last=True),)
-    made = [hand]
-    inner, final = (INNER,), (FINAL,)
-    for step in range(1, math.ceil(fine / 2) + 1):
-        inner = (*inner, 3 * inner_rays(inner)) if step <= 1 else inner
-        final = (*final, 3 * inner_rays(final))
-        made.append(Tier(inner, final, min(32 * 2**step, 128), 36, 0.05, 16, 256))
+    made = [HAND]
+    if tolerance < ENOUGH_IN_HAND:
+        made.append(REST)
+    if tolerance < ENOUGH_AT_REST:
+        made.append(FINE)
     return (*made[:-1], replace(made[-1], last=True))
-
-
-def inner_rays(counts: tuple[int, ...]) -> int:
-    """In all."""
-    return sum(counts)
 
 
 class TierStage:
