@@ -20,16 +20,17 @@ import numpy.typing as npt
 
 from studio_core.brdfs.calls import evaluate_at
 from studio_core.transport.cells import CELLS, PARTS, RINGS, cell_projected_angles
+from studio_core.transport.symmetries import Symmetry, symmetry
 
 F32 = npt.NDArray[np.float32]
 F64 = npt.NDArray[np.float64]
 I64 = npt.NDArray[np.int64]
+Bools = npt.NDArray[np.bool_]
 
-HALF = PARTS // 2
 VIEWS = 3  # heights a ring that are looked from
 HEIGHTS = 3  # and to
-CIRCLES, AROUND = 48, 32  # about the mirror direction, half a turn
-WIDE_CIRCLES, WIDE_AROUND = 24, 16
+CIRCLES, AROUND = 36, 32  # about the mirror direction, half a turn
+WIDE_CIRCLES, WIDE_AROUND = 40, 28
 GRADE = 12.0
 CONSTANT = 1e-4  # of a term's largest value
 ALIKE = 1e-3  # two values of a kernel that are taken for the same
@@ -54,15 +55,15 @@ class Kernel:
 class Traits:
     """What probing finds: `matte` (T,) the value of terms that are constant, else NaN; who is `signed` (T,).
 
-    `turns`: nothing changes when both directions turn around the normal, nor with the sense of turning;
-    `flips` (2,): nor when both are mirrored in x, in y; `reciprocal`: nor when they are exchanged.
+    `turns` (T,): nothing changes when both directions turn around the normal, nor with the sense of turning;
+    `reciprocal` (T,): nor when both are exchanged. `alike`: which symmetries all terms have.
     """
 
     matte: F64
-    signed: npt.NDArray[np.bool_]
-    turns: bool
-    flips: tuple[bool, bool]
-    reciprocal: bool
+    signed: Bools
+    turns: Bools
+    alike: Symmetry
+    reciprocal: Bools
 
 
 def ring_measures() -> F64:
@@ -103,48 +104,49 @@ def traits(kernel: Kernel) -> Traits:
     largest = np.maximum(np.abs(low), np.abs(high))
     constant = high - low <= CONSTANT * largest
     matte = np.where(constant, plain.mean(axis=(0, 1)), np.nan)
-    own = ~constant
 
-    def alike(other: F64, one: F64) -> bool:
-        other, one = other[..., own], one[..., own]
-        limit = ALIKE * np.maximum(np.abs(other), np.abs(one)) + 1e-6 * largest[own]
-        return bool((np.abs(other - one) > limit).mean(axis=(0, 1)).max(initial=0.0) <= ODD)
+    def same(other: F64, one: F64) -> Bools:
+        limit = ALIKE * np.maximum(np.abs(other), np.abs(one)) + 1e-6 * largest
+        far = (np.abs(other - one) > limit).mean(axis=(0, 1))
+        return np.asarray(constant | (far <= ODD), np.bool_)
 
-    across, along = np.array([-1, 1, 1], np.float32), np.array([1, -1, 1], np.float32)
-    mirrored = alike(at(a * along, b * along), plain)
-    turns = mirrored and alike(at(_turned(a, turn), _turned(b, turn[:, None])), plain)
-    flips = (turns or alike(at(a * across, b * across), plain), mirrored)
+    flip_x, flip_y = np.array([-1, 1, 1], np.float32), np.array([1, -1, 1], np.float32)
+    along = same(at(a * flip_y, b * flip_y), plain)
+    turns = along & same(at(_turned(a, turn), _turned(b, turn[:, None])), plain)
+    across, half = turns, turns
+    if not turns.all():
+        across = turns | same(at(a * flip_x, b * flip_x), plain)
+        half = (across & along) | same(at(a * (flip_x * flip_y), b * (flip_x * flip_y)), plain)
+    alike = symmetry(bool(across.all()), bool(along.all()), bool(half.all()))
     exchanged = b[:, :: LIT // 4]
     there = plain[:, :: LIT // 4]
     back = np.stack(
         [at(i, np.repeat(o[None, None], len(i), 0))[:, 0] for o, i in zip(a, exchanged, strict=True)]
     )
-    return Traits(matte, low < -1e-6 * largest, turns, flips, alike(back, there))
+    return Traits(matte, low < -1e-6 * largest, turns, alike, same(back, there))
 
 
 @dataclass(frozen=True)
 class _Look:
-    """Directions (P, 3) seen from one height, first those of the grid (rings, heights, bins, columns).
+    """Directions (3, P) seen from one height, first those of the grid: `grid` (K, rings, bins) points a bin.
 
     Weights dω cosθ of the grid, and of the others with the bins (ring · bins + bin) that they are in;
     `missing` (rings, bins) is what all of them lack of a bin's own measure.
     """
 
     directions: F32
-    grid: F64
-    others: F64
+    grid: F32
+    others: F32
     bins: I64
     missing: F64
 
     def sums(self, values: F32) -> F64:
         """(rings, bins) integrals of a term's values (P,) over each bin."""
         regular: F32 = values[: self.grid.size].reshape(self.grid.shape)
-        made: F64 = np.einsum("rhbc,rhbc->rb", regular, self.grid)
-        found = np.bincount(self.bins, values[self.grid.size :] * self.others, minlength=self.missing.size)
-        made += found.reshape(self.missing.shape)
-        _, heights, _, columns = self.grid.shape
-        places = [regular[:, h, :, c] for h in range(heights) for c in range(columns)]
-        least, most = functools.reduce(np.minimum, places), functools.reduce(np.maximum, places)
+        rest = values[self.grid.size :] * self.others
+        found = np.bincount(self.bins, rest, minlength=self.missing.size)
+        made: F64 = found.reshape(self.missing.shape) + (regular * self.grid).sum(axis=0)
+        least, most = regular.min(axis=0), regular.max(axis=0)
         made += self.missing * (np.maximum(2 * least - most, 0.0) + np.minimum(2 * most - least, 0.0))
         return made
 
@@ -189,27 +191,24 @@ def _look(theta: float, azimuths: Any, heights: int, columns: int, circles: int,
         round_, own = np.concatenate([round_, round_ * [1, -1, 1]]), np.tile(own, 2)
     w = np.concatenate([regular, round_])
     by_circles = np.maximum(_circle_angles(theta, w, circles, around), 1e-300)
-    ratio = (
-        np.minimum(step * turn / by_circles, 1e100) ** 2
-    )  # the grid is no denser at the pole than its rings
+    # the grid counts as no denser at the pole than its heights are
+    ratio = np.minimum(step * turn / by_circles, 1e100) ** 2
     share = np.where(np.arange(len(w)) < len(regular), 1 / (1 + ratio), ratio / (1 + ratio))
     weights = np.concatenate([np.sin(t).ravel() * step * turn, own]) * share * np.maximum(w[:, 2], 0.0)
-    count = len(azimuths) // columns
-    shape = (RINGS, heights, count, columns)
-    grid, others = weights[: len(regular)].reshape(shape), weights[len(regular) :]
-    ring = np.minimum(
-        (np.arccos(np.clip(round_[:, 2], 0, 1)) * (RINGS * 2 / math.pi)).astype(np.int64), RINGS - 1
-    )
+    count, own_points = len(azimuths) // columns, len(regular)
+    order = np.arange(own_points).reshape(RINGS, heights, count, columns).transpose(1, 3, 0, 2)
+    grid, others = weights[order].reshape(-1, RINGS, count), weights[own_points:]
+    height = np.arccos(np.clip(round_[:, 2], 0, 1)) * (RINGS * 2 / math.pi)
     since = np.arctan2(round_[:, 1], round_[:, 0]) - (azimuths[0] - turn / 2)
     place = np.floor(since / (turn * columns)).astype(np.int64)
-    bins = ring * count + (place % count if columns > 1 else np.clip(place, 0, count - 1))
-    measures = np.repeat(ring_measures()[:, None] * (turn * columns / (2 * math.pi)), count, axis=1)
-    missing = (
-        measures
-        - grid.sum(axis=(1, 3))
-        - np.bincount(bins, others, minlength=measures.size).reshape(-1, count)
-    )
-    return _Look(w.astype(np.float32), grid, others, bins, missing)
+    place = place % count if columns > 1 else np.clip(place, 0, count - 1)
+    bins = np.minimum(height.astype(np.int64), RINGS - 1) * count + place
+    missing = np.repeat(ring_measures()[:, None] * (turn * columns / (2 * math.pi)), count, axis=1)
+    missing -= grid.sum(axis=0)
+    missing -= np.bincount(bins, others, minlength=missing.size).reshape(missing.shape)
+    w = np.concatenate([regular[order.ravel()], round_])
+    directions = np.ascontiguousarray(w.T, np.float32)
+    return _Look(directions, grid.astype(np.float32), others.astype(np.float32), bins, missing)
 
 
 @functools.cache
@@ -230,7 +229,7 @@ def ring_means(kernel: Kernel, terms: Sequence[int]) -> F64:
     made = np.zeros((len(terms), RINGS, RINGS, PARTS))
     for row, (theta, weight, look) in enumerate(_half_looks()):
         wo = np.array([math.sin(theta), 0.0, math.cos(theta)], np.float32)
-        values = kernel(wo, look.directions)
+        values = kernel(wo, look.directions.T)
         for number, term in enumerate(terms):
             made[number, row // VIEWS] += weight * look.sums(values[:, term])
     half = made / (ring_measures() / (2 * PARTS))[:, None]
@@ -253,30 +252,23 @@ def _whole_looks() -> tuple[tuple[float, _Look], ...]:
     return tuple((theta, _look(theta, azimuths, 2, 2, WIDE_CIRCLES, WIDE_AROUND)) for theta in angles)
 
 
-def cell_means(kernel: Kernel, terms: Sequence[int], flips: tuple[bool, bool]) -> F32:
-    """(T, CELLS of wo, CELLS of wi) of terms that may have a direction of their own."""
-    made = np.empty((len(terms), RINGS, PARTS, RINGS, PARTS), np.float32)
-    parts = range(PARTS // 4) if all(flips) else range(HALF) if any(flips) else range(PARTS)
-    if flips == (True, False):  # mirrored in x: the half from −π/2 to π/2
-        parts = range(-PARTS // 4, PARTS // 4)
+def cell_means(kernel: Kernel, terms: Sequence[int], alike: Symmetry) -> F32:
+    """(T, representatives of wo, CELLS of wi) of terms that may have a direction of their own."""
+    parts = alike.parts
+    made = np.empty((len(terms), RINGS, len(parts), RINGS, PARTS), np.float32)
     for ring, (theta, look) in enumerate(_whole_looks()):
-        for part in parts:
+        x, y, z = look.directions
+        w = np.empty_like(look.directions)
+        w[2] = z
+        for number, part in enumerate(parts):
             turn = (part + 0.5) * (2 * math.pi / PARTS)
-            w = _turned(look.directions, turn)
-            wo = np.array(
-                [math.cos(turn) * math.sin(theta), math.sin(turn) * math.sin(theta), math.cos(theta)]
-            )
-            values = kernel(wo, w)
-            for number, term in enumerate(terms):
-                made[number, ring, part] = np.roll(look.sums(values[:, term]), part, axis=1)
-    every = np.arange(PARTS)
-    across, along = (HALF - 1 - every) % PARTS, (PARTS - 1 - every) % PARTS  # where mirroring leads to
-    if flips[0]:
-        target = every[: PARTS // 4] if flips[1] else np.arange(-PARTS // 4, PARTS // 4) % PARTS
-        made[:, :, across[target]] = made[:, :, target][..., across]
-    if flips[1]:
-        made[:, :, along[:HALF]] = made[:, :, :HALF][..., along]
-    flat = made.reshape(len(terms), CELLS, CELLS)
+            c, s = np.float32(math.cos(turn)), np.float32(math.sin(turn))
+            w[0], w[1] = c * x - s * y, s * x + c * y
+            wo = np.array([c * math.sin(theta), s * math.sin(theta), math.cos(theta)])
+            values = kernel(wo, w.T)
+            for row, term in enumerate(terms):
+                made[row, ring, number] = np.roll(look.sums(values[:, term]), part, axis=1)
+    flat = made.reshape(len(terms), -1, CELLS)
     flat /= cell_projected_angles()
     return flat
 

@@ -26,6 +26,7 @@ import numpy.typing as npt
 
 from studio_core.transport.cell_means import ring_measures
 from studio_core.transport.cells import CELLS, PARTS, RINGS, cell_projected_angles
+from studio_core.transport.symmetries import Symmetry
 
 F32 = npt.NDArray[np.float32]
 F64 = npt.NDArray[np.float64]
@@ -146,50 +147,77 @@ class Turning:
 
 
 class Directed:
-    """Of a kernel with a direction of its own: means (CELLS of wo, CELLS of wi)."""
+    """Of a kernel with a direction of its own: means (N representatives of wo, CELLS of wi), `cell_means`.
 
-    def __init__(self, means: F32, reciprocal: bool, signed: bool, most: int, energy: bool = True) -> None:
-        root = np.sqrt(cell_projected_angles()).astype(np.float32)
-        self._root, self._signed = root, signed
-        whole = means * (root[:, None] * root)
+    Everything is done with N rows: the kernel is known between representatives and their images, and each
+    combination of these by signs is a block of its own.
+    """
+
+    def __init__(
+        self, means: F32, alike: Symmetry, reciprocal: bool, signed: bool, most: int, energy: bool = True
+    ) -> None:
+        images, signs = alike.images, alike.signs.astype(np.float32)
+        self._alike, self._signed, self._group = alike, signed, len(images)
+        root = np.sqrt(cell_projected_angles()[images[0]]).astype(np.float32)
+        self._root = root
+        parts = np.moveaxis(means[:, images], 1, 0) * (root[:, None] * root)
         if reciprocal:
-            own = whole @ root
-            whole = np.float32(0.5) * (whole + whole.T)
+            own = parts.sum(axis=0) @ root
+            parts = np.float32(0.5) * (parts + parts.transpose(0, 2, 1))
             if not signed:
-                scale = _scales(whole, root, own).astype(np.float32)
-                whole *= scale[:, None] * scale
-        self.norm = float(np.linalg.norm(whole))
-        left, right = _energy(whole, root) if energy else (np.zeros((CELLS, 0)),) * 2
+                scale = _scales(parts.sum(axis=0), root, own).astype(np.float32)
+                parts *= scale[:, None] * scale
+        self.norm = float(np.linalg.norm(parts)) * math.sqrt(self._group)
+        blocks = np.tensordot(signs, parts, axes=(1, 0))
+        empty = np.zeros((len(root), 0))
+        left, right = _energy(blocks[0], root) if energy else (empty, empty)
         self._left, self._right = left.astype(np.float32), right.astype(np.float32)
         self.base = left.shape[1]
-        self._u, found, self._v = _randomised(whole, self._left, self._right, min(most + MORE, CELLS))
-        self.values = found[:most].astype(np.float64)
+        count = min(most + MORE, len(root))
+        none = empty.astype(np.float32)
+        found = [
+            _randomised(block, *((self._left, self._right) if kind == 0 else (none, none)), count)
+            for kind, block in enumerate(blocks)
+        ]
+        self._u, self._v = np.stack([u for u, _, _ in found]), np.stack([v for _, _, v in found])
+        self.values = np.concatenate([values for _, values, _ in found]).astype(np.float64)
         self.copies = np.ones(len(self.values), np.int64)
-        self._u, self._v = self._u[:, :most], self._v[:, :most]
         # what is compared: some cells of light, each standing for its neighbours
-        self._some = (np.arange(LOOKED_AT) * (CELLS / LOOKED_AT)).astype(np.int64)
-        self._true = whole[:, self._some]
-        self._back = _reflectances(whole, root)[self._some]
+        self._some = np.unique(np.linspace(0, len(root) - 1, LOOKED_AT).astype(np.int64))
+        self._true = parts[:, :, self._some]
+        self._back = _reflectances(blocks[0], root)[self._some]
         self._own = float(np.linalg.norm(self._true))
 
     def measure(self, values: F64) -> tuple[float, float]:
         """See `Spectrum`."""
-        some = self._v[self._some] * values.astype(np.float32)
-        dense = self._u @ some.T + self._left @ self._right[self._some].T
+        size = values.astype(np.float32).reshape(len(self._u), 1, -1)
+        blocks = (self._u * size) @ self._v[:, self._some].transpose(0, 2, 1)
+        blocks[0] += self._left @ self._right[self._some].T
+        dense = np.tensordot(self._alike.signs.T.astype(np.float32) / self._group, blocks, axes=(1, 0))
         spill = 0.0
         if not self._signed:
-            under = (self._root @ np.minimum(dense, 0.0)) / self._root[self._some]
+            under = (self._root @ np.minimum(dense, 0.0).sum(axis=0)) / self._root[self._some]
             spill = float((-under / self._back).max())
             dense = np.maximum(dense, 0.0)
         return float(np.linalg.norm(dense - self._true)) / max(self._own, 1e-30), spill
 
     def products(self, values: F64) -> tuple[F64, F64]:
         """See `Spectrum`."""
-        kept = np.flatnonzero(values)
-        size = np.sqrt(values[kept])
-        incoming = np.concatenate([self._right, self._v[:, kept] * size], axis=1) / self._root[:, None]
-        outgoing = np.concatenate([self._left, self._u[:, kept] * size], axis=1) / self._root[:, None]
-        return incoming, outgoing
+        incoming, outgoing = [self._spread(self._right, 0)], [self._spread(self._left, 0)]
+        for kind, own in enumerate(values.reshape(len(self._u), -1)):
+            kept = np.flatnonzero(own)
+            size = np.sqrt(own[kept])
+            incoming.append(self._spread(self._v[kind][:, kept] * size, kind))
+            outgoing.append(self._spread(self._u[kind][:, kept] * size, kind))
+        return np.concatenate(incoming, axis=1), np.concatenate(outgoing, axis=1)
+
+    def _spread(self, functions: npt.NDArray[np.floating], kind: int) -> F64:
+        """(CELLS, K) over all cells, and without weights, of functions (N, K) of some kind."""
+        made = np.empty((CELLS, functions.shape[1]))
+        plain = functions / (self._root[:, None] * math.sqrt(self._group))
+        for cells, sign in zip(self._alike.images, self._alike.signs[kind], strict=True):
+            made[cells] = plain * sign
+        return made
 
 
 def _energy(matrix: F32 | F64, root: F32 | F64) -> tuple[F64, F64]:

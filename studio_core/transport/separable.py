@@ -182,16 +182,19 @@ def _spectra(
     weights = []
     energy = isinstance(how, tuple)
     most = how[1] if isinstance(how, tuple) else how
-    if found.turns:
-        rings = ring_measures()
-        for t, means in zip(own, ring_means(kernel, own), strict=True):
-            spectra.append(Turning(means, found.reciprocal, bool(found.signed[t]), energy))
-            weights.append(float(rings @ np.abs(means).mean(axis=2) @ rings) / math.pi)
-    elif own:
-        cells = cell_projected_angles()
-        for t, flat in zip(own, cell_means(kernel, own, found.flips), strict=True):
-            spectra.append(Directed(flat, found.reciprocal, bool(found.signed[t]), most, energy))
-            weights.append(float(cells @ np.abs(flat) @ cells) / math.pi)
+    rings, cells = ring_measures(), cell_projected_angles()
+    some = cells[found.alike.images[0]] * len(found.alike.images)
+    turning, directed = [t for t in own if found.turns[t]], [t for t in own if not found.turns[t]]
+    rounds = dict(zip(turning, ring_means(kernel, turning), strict=True)) if turning else {}
+    others = dict(zip(directed, cell_means(kernel, directed, found.alike), strict=True)) if directed else {}
+    for t in own:
+        how_so = bool(found.reciprocal[t]), bool(found.signed[t])
+        if t in rounds:
+            spectra.append(Turning(rounds[t], *how_so, energy))
+            weights.append(float(rings @ np.abs(rounds[t]).mean(axis=2) @ rings) / math.pi)
+        else:
+            spectra.append(Directed(others[t], found.alike, *how_so, most, energy))
+            weights.append(float(some @ np.abs(others[t]) @ cells) / math.pi)
     limited = np.minimum(weights, 1.0)
     return spectra, limited / max(limited.max(initial=0.0), 1e-300)
 

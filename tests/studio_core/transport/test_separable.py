@@ -19,8 +19,11 @@ from studio_core.registry import PluginHost
 from studio_core.scene.nodes import Material, Scene
 from studio_core.shading.artifacts import Shapes
 from studio_core.shading.materials import shapes
+from studio_core.transport.cell_means import Kernel, cell_means, traits
 from studio_core.transport.cells import CELLS, PARTS, RINGS, cell_projected_angles
+from studio_core.transport.factors import Directed
 from studio_core.transport.separable import SPILL, Separator, fixed
+from studio_core.transport.symmetries import symmetry
 from studio_plugins.residual.material import scene_material
 
 W = cell_projected_angles().astype(np.float64)
@@ -116,7 +119,7 @@ def test_means_over_cells_are_those_of_brute_force() -> None:
     light, view = rng.integers(0, CELLS, (2, 60))
     view[:30] = light[:30] // PARTS * PARTS + (light[:30] + PARTS // 2 + rng.integers(-3, 4, 30)) % PARTS
     true = np.array([cell_mean(brdf, shape, i, o, 6)[1] for i, o in zip(light, view, strict=True)])
-    np.testing.assert_allclose(fine[light, view], true, atol=0.01 * fine.max())
+    np.testing.assert_allclose(fine[light, view], true, atol=0.015 * fine.max())
 
 
 def test_a_lobe_with_a_direction_has_its_means_too() -> None:
@@ -129,6 +132,28 @@ def test_a_lobe_with_a_direction_has_its_means_too() -> None:
     view[:25] = light[:25] // PARTS * PARTS + (light[:25] + PARTS // 2 + rng.integers(-3, 4, 25)) % PARTS
     true = np.array([cell_mean(brdf, shape, i, o, 5)[1] for i, o in zip(light, view, strict=True)])
     assert np.sqrt(np.mean((dense[light, view] - true) ** 2)) < 0.08 * np.sqrt(np.mean(true**2))
+
+
+@pytest.mark.parametrize(
+    "known", [(True, False, False), (False, True, False), (False, False, True), (False,) * 3]
+)
+def test_symmetries_save_work_and_change_nothing(known: tuple[bool, bool, bool]) -> None:
+    """Made with all of its symmetries, with one, and with none, brushed metal is the same kernel."""
+    shape = shape_of("ward", roughness=0.7)
+    kernel = Kernel(MODELS["ward"].address, MODELS["ward"].terms, shape)
+    found = traits(kernel)
+    assert len(found.alike.images) == 4
+    assert found.reciprocal.all()
+    assert not found.turns[1]
+    dense = []
+    for alike in (found.alike, symmetry(*known)):
+        means = cell_means(kernel, [1], alike)[0]
+        spectrum = Directed(means, alike, True, False, 60)
+        incoming, outgoing = spectrum.products(
+            np.where(spectrum.values > np.sort(spectrum.values)[-40], spectrum.values, 0)
+        )
+        dense.append(incoming @ outgoing.T)
+    assert relative_error(dense[1], dense[0]) < 0.02
 
 
 @settings(max_examples=8, deadline=None)
