@@ -1,7 +1,7 @@
 """Kernels of `source_light`: which samples of lights a vertex sees, and the sums of their light.
 
 Samples are those of `light_samples.LightSamples`, places relative to the origin of the mesh. Vertex v looks
-at column c in variant `variant_of(v, P)`; bit c % 64 of word c // 64 of its row belongs to it.
+at column c in variant[v]; bit c % 64 of word c // 64 of its row belongs to it.
 """
 
 from __future__ import annotations
@@ -22,13 +22,9 @@ I64 = npt.NDArray[np.int64]
 U64 = npt.NDArray[np.uint64]
 
 DISTANT, SPOT, AREA = 0, 2, 3
+BLOCK = 256
+"""Vertices near each other whose rays to one sample are traced together."""
 _ONE, _NONE = np.uint64(1), np.uint64(0)
-
-
-@kernel
-def variant_of(vertex: int, variants: int) -> int:
-    """Which variant a vertex looks in: vertices with near numbers differ."""
-    return (vertex * 40503 >> 4) % variants if variants > 1 else 0
 
 
 @kernel
@@ -83,6 +79,7 @@ def trace_pairs(
     positions: F32,
     normals: F32,
     kind: I8,
+    variants: I32,
     place: F64,
     axis: F64,
     cone: F64,
@@ -103,52 +100,56 @@ def trace_pairs(
     packet.view(np.uint32)[MASK, :] = OPAQUE
     who = np.zeros((8, 2), np.int64)
     used = 0
-    variants, columns = place.shape[0], len(kind)
-    for at in range(start, stop):
-        v = order[at]
-        rays = 0
-        variant = variant_of(v, variants)
-        x, y, z = float(positions[v, 0]), float(positions[v, 1]), float(positions[v, 2])
-        nx, ny, nz = float(normals[v, 0]), float(normals[v, 1]), float(normals[v, 2])
-        ox, oy, oz = origins[v, 0], origins[v, 1], origins[v, 2]
-        good = abs(ox) + abs(oy) + abs(oz) < np.inf
+    columns = len(kind)
+    for first in range(start, stop, BLOCK):
+        last = min(first + BLOCK, stop)
         for word in range(todo.shape[1]):
-            marks = todo[v, word]
-            if marks == _NONE:
-                continue
-            seen[v, word] &= ~marks
-            todo[v, word] = _NONE
+            marked = _NONE
+            for at in range(first, last):
+                v = order[at]
+                marked |= todo[v, word]
+                seen[v, word] &= ~todo[v, word]
             for column in range(word * 64, min(word * 64 + 64, columns)):
-                if not (marks >> np.uint64(column & 63)) & _ONE:
+                bit = _ONE << np.uint64(column & 63)
+                if not marked & bit:
                     continue
-                target = place[variant, column]
-                dx, dy, dz, weight = light_at(kind[column], target, axis[column], cone[column], x, y, z)
-                if not (good and weight > 0.0 and dx * nx + dy * ny + dz * nz > 0.0):
-                    continue
-                far = np.float32(np.inf)
-                if kind[column] != DISTANT:  # from where the ray starts
-                    dx, dy, dz = (
-                        target[0] + shift[0] - ox,
-                        target[1] + shift[1] - oy,
-                        target[2] + shift[2] - oz,
-                    )
-                    length = np.sqrt(dx * dx + dy * dy + dz * dz)
-                    if not (length > 0.0 and dx * nx + dy * ny + dz * nz > 0.0):
+                kind_of, axis_of, cone_of = kind[column], axis[column], cone[column]
+                for at in range(first, last):
+                    v = order[at]
+                    if not todo[v, word] & bit:
                         continue
-                    dx, dy, dz = dx / length, dy / length, dz / length
-                    far = np.float32(max(length - shorten, 0.0))
-                packet[ORIGIN, used], packet[ORIGIN + 1, used], packet[ORIGIN + 2, used] = ox, oy, oz
-                packet[DIRECTION, used] = dx
-                packet[DIRECTION + 1, used] = dy
-                packet[DIRECTION + 2, used] = dz
-                packet[TFAR, used] = far
-                who[used, 0], who[used, 1] = v, column
-                used += 1
-                rays += 1
-                if used == 8:
-                    _send(occluded8, scene, packet, valid, used, who, seen)
-                    used = 0
-        counts[v] = rays
+                    target = place[variants[v], column]
+                    x, y, z = float(positions[v, 0]), float(positions[v, 1]), float(positions[v, 2])
+                    nx, ny, nz = float(normals[v, 0]), float(normals[v, 1]), float(normals[v, 2])
+                    dx, dy, dz, weight = light_at(kind_of, target, axis_of, cone_of, x, y, z)
+                    if not (weight > 0.0 and dx * nx + dy * ny + dz * nz > 0.0):
+                        continue
+                    ox, oy, oz = origins[v, 0], origins[v, 1], origins[v, 2]
+                    far = np.float32(np.inf)
+                    if kind_of != DISTANT:  # from where the ray starts
+                        dx = target[0] + shift[0] - ox
+                        dy = target[1] + shift[1] - oy
+                        dz = target[2] + shift[2] - oz
+                        length = np.sqrt(dx * dx + dy * dy + dz * dz)
+                        if not (length > 0.0 and dx * nx + dy * ny + dz * nz > 0.0):
+                            continue
+                        dx, dy, dz = dx / length, dy / length, dz / length
+                        far = np.float32(max(length - shorten, 0.0))
+                    if not abs(ox) + abs(oy) + abs(oz) < np.inf:
+                        continue
+                    packet[ORIGIN, used], packet[ORIGIN + 1, used], packet[ORIGIN + 2, used] = ox, oy, oz
+                    packet[DIRECTION, used] = dx
+                    packet[DIRECTION + 1, used] = dy
+                    packet[DIRECTION + 2, used] = dz
+                    packet[TFAR, used] = far
+                    who[used, 0], who[used, 1] = v, column
+                    counts[v] += 1
+                    used += 1
+                    if used == 8:
+                        _send(occluded8, scene, packet, valid, used, who, seen)
+                        used = 0
+            for at in range(first, last):
+                todo[order[at], word] = _NONE
     if used > 0:
         _send(occluded8, scene, packet, valid, used, who, seen)
 
@@ -171,6 +172,7 @@ def mark_moved(
     positions: F32,
     normals: F32,
     kind: I8,
+    variants: I32,
     place: F64,
     axis: F64,
     cone: F64,
@@ -186,9 +188,9 @@ def mark_moved(
     before and now (M, 4) are spheres, centre and radius, about what has moved. What was not seen can only
     have been freed by what was in front of it, what was seen can only be hidden by what is there now.
     """
-    variants, columns = place.shape[0], len(kind)
+    columns = len(kind)
     for v in range(start, stop):
-        variant = variant_of(v, variants)
+        variant = variants[v]
         x, y, z = float(positions[v, 0]), float(positions[v, 1]), float(positions[v, 2])
         nx, ny, nz = float(normals[v, 0]), float(normals[v, 1]), float(normals[v, 2])
         for column in range(columns):
@@ -230,6 +232,7 @@ def sum_light(
     normals: F32,
     tangents: F32,
     kind: I8,
+    variants: I32,
     place: F64,
     axis: F64,
     cone: F64,
@@ -251,7 +254,6 @@ def sum_light(
     light (P, C, 3) is that of the samples with gains. A vertex of material row r has count[r] functions:
     k at cell c of the direction to the light is incoming[base[r] + c · count[r] + k].
     """
-    variants = place.shape[0]
     axes = np.empty((3, 3))
     most = 0
     for r in range(len(count)):
@@ -259,7 +261,7 @@ def sum_light(
     sums = np.zeros((most, 3))
     for at in range(start, stop):
         v = points[at]
-        variant = variant_of(v, variants)
+        variant = variants[v]
         x, y, z = float(positions[v, 0]), float(positions[v, 1]), float(positions[v, 2])
         surface_frame(normals[v], tangents[v], axes)
         red, green, blue = 0.0, 0.0, 0.0

@@ -38,7 +38,7 @@ class SampleCounts:
 
 @dataclass(frozen=True, eq=False)
 class LightSamples:
-    """Samples of one light, or of several, in P variants of C columns.
+    """Samples of one light, or of several: P rows, variants for each zone of the scene, of C columns.
 
     place (P, C, 4): (x, y, z, 1) in the world, (x, y, z, 0) a unit direction towards the light. kind (C,),
     axis (C, 3) and cone (C, 2), cosines of cone and full cone, say how its light falls off. light (P, C, 3)
@@ -58,7 +58,7 @@ class LightSamples:
         return len(self.kind)
 
     @property
-    def variants(self) -> int:
+    def rows(self) -> int:
         """P."""
         return len(self.place)
 
@@ -76,16 +76,16 @@ class LightSamples:
         return np.asarray(self.light * gain, np.float32)
 
 
-def joined(parts: Sequence[LightSamples], variants: int) -> LightSamples:
-    """Several lights' samples in one list, all of so many variants."""
+def joined(parts: Sequence[LightSamples], rows: int) -> LightSamples:
+    """Several lights' samples in one list, all of so many rows."""
     if not parts:
-        none = np.zeros((variants, 0, 4))
+        none = np.zeros((rows, 0, 4))
         return LightSamples(
             none,
             np.zeros(0, np.int8),
             np.zeros((0, 3)),
             np.zeros((0, 2)),
-            np.zeros((variants, 0, 3), np.float32),
+            np.zeros((rows, 0, 3), np.float32),
             (),
             (),
         )
@@ -120,11 +120,12 @@ def shuffles(columns: int, variants: int, seed: int) -> I64:
     return np.asarray(ranks, np.int64)
 
 
-def lamp_samples(lamp: Lamp, samples: int, variants: int = VARIANTS) -> LightSamples:
-    """A lamp; one that has no extent has one column, whatever is asked for.
+def lamp_samples(lamp: Lamp, samples: int, variants: int, zones: int) -> LightSamples:
+    """A lamp, the same for all zones; one that has no extent has one column, whatever is asked for.
 
     With one variant these are the samples of `lamp_targets`.
     """
+    rows = zones * variants
     targets = lamp_targets(lamp, samples * variants)
     if len(targets) == 1:
         columns, places = 1, np.repeat(targets[None], variants, axis=0)
@@ -138,17 +139,19 @@ def lamp_samples(lamp: Lamp, samples: int, variants: int = VARIANTS) -> LightSam
     vectors = np.concatenate([lamp.position, lamp.axis, lamp.across, lamp.up])
     numbers = (*vectors.tolist(), lamp.cos_cone, lamp.cos_inner, lamp.angle)
     return LightSamples(
-        places,
+        np.tile(places, (zones, 1, 1)),
         np.full(columns, _KINDS[lamp.kind], np.int8),
         np.tile(lamp.axis, (columns, 1)),
         np.tile([lamp.cos_cone, lamp.cos_inner], (columns, 1)),
-        np.full((variants, columns, 3), share, np.float32),
+        np.full((rows, columns, 3), share, np.float32),
         (lamp.node,) * columns,
         (((lamp.kind, *numbers, variants), columns),),
     )
 
 
-def sun_samples(sun: Sun, samples: int, variants: int, owner: NodeId, key: Hashable) -> LightSamples:
+def sun_samples(
+    sun: Sun, samples: int, variants: int, zones: int, owner: NodeId, key: Hashable
+) -> LightSamples:
     """The compact sources of an environment, each in about `samples` columns, the strong ones in more.
 
     A column stands for neighbouring samples of the sun; variants take one of them each, by its power, with
@@ -165,4 +168,10 @@ def sun_samples(sun: Sun, samples: int, variants: int, owner: NodeId, key: Hasha
         at = first + np.clip(chosen, 0, last - first - 1)
         directions.append(sun.directions[at])
         light.append(sun.irradiance[at] * (upto[-1] / columns / power[at])[..., None])
-    return distant(np.concatenate(directions, axis=1), np.concatenate(light, axis=1), owner, key)
+    tiles = (zones, 1, 1)
+    return distant(
+        np.tile(np.concatenate(directions, axis=1), tiles),
+        np.tile(np.concatenate(light, axis=1), tiles),
+        owner,
+        key,
+    )

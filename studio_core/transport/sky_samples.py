@@ -21,17 +21,20 @@ from studio_core.kernels.packets import OPAQUE
 from studio_core.kernels.raycast import RayCaster
 from studio_core.parallel import Checkpoints, Workers
 from studio_core.scene.shading_mesh import NO_BACK
+from studio_core.scene.transform import Transform
 from studio_core.scene.world_mesh import WorldMesh
 from studio_core.shading.artifacts import Casters, Lighting
 from studio_core.transport.light_bits import LightBits, LitPoints
 from studio_core.transport.light_samples import LightSamples, SampleCounts, distant, shuffles
+from studio_core.transport.zones import ZONES, Zones
 
 F32 = npt.NDArray[np.float32]
 F64 = npt.NDArray[np.float64]
+I32 = npt.NDArray[np.int32]
 I64 = npt.NDArray[np.int64]
 Bools = npt.NDArray[np.bool_]
 
-STARTS, RAYS = 128, 4
+STARTS, RAYS = 192, 4
 """Receivers of the pilot, and rays from each to the points that it asks."""
 BY_RADIANCE = 0.1
 """Share of the samples that is drawn by radiance alone."""
@@ -43,11 +46,20 @@ ALIKE = 0.5
 
 @dataclass(frozen=True, eq=False)
 class _Drawn:
-    """Directions for one `SampleCounts`, and the probability of the leaves (S,) they were drawn with."""
+    """Directions for one `SampleCounts`, what was worth how much then, and the probabilities of cells."""
 
     light: tuple[object, ...]
     samples: LightSamples
+    worth: F64
     probability: F64
+
+    def worse(self, power: F64, worth: F64) -> bool:
+        """Whether new directions would be much better."""
+        if worth is self.worth:
+            return False
+        return _variance(power, worth, self.probability) > WORSE * _variance(
+            power, worth, probabilities(power, worth)
+        )
 
 
 class Pilot:
@@ -58,7 +70,11 @@ class Pilot:
         self._bits = LightBits(workers)
         self._caster: RayCaster | None = None
         self._seen: Bools | None = None
+        self._transforms: tuple[Transform, ...] | None = None
         self._vertices: I64 = np.zeros(0, np.int64)
+        self._worth: F64 = np.zeros((0, 0))
+        self.zones = Zones.about(np.zeros((1, 3)))
+        """Zones of the scene, by where the points are."""
         ways = direction_set(SMALLEST).directions.astype(np.float64)
         self._ways = distant(ways[None], np.ones((1, len(ways), 3), np.float32), "", "pilot")
 
@@ -68,21 +84,40 @@ class Pilot:
         return self._bits.nbytes
 
     def usefulness(
-        self, mesh: WorldMesh, casters: Casters, seen: Bools | None, job: Checkpoints | None = None
+        self,
+        mesh: WorldMesh,
+        casters: Casters,
+        seen: Bools | None,
+        moving: bool,
+        job: Checkpoints | None = None,
     ) -> F64:
-        """(2^10,) root mean square of visible cosines."""
-        if casters.primary is not self._caster or self._strange(seen):
+        """(ZONES, 2^10) root mean square of visible cosines at points that are and face about so.
+
+        The same array where nothing has changed; while things are `moving`, it may be as it was before.
+        """
+        elsewhere = casters.primary is not self._caster or self._strange(seen)
+        if not elsewhere and (moving or casters.transforms == self._transforms):
+            return self._worth
+        if elsewhere:
             self._vertices = self._points(mesh, casters.primary, seen, job)
             self._caster, self._seen = casters.primary, None if seen is None else seen.copy()
             self._bits = LightBits(self._workers)
-        if not len(self._vertices):
-            return np.ones(len(self._ways))
-        points = LitPoints.of(mesh, self._vertices)
-        self._bits.update(points, casters, self._ways, job)
-        bits = np.unpackbits(self._bits.seen.view(np.uint8), axis=1, bitorder="little")
-        cosine = points.normals @ self._ways.place[0, :, :3].T.astype(np.float32)
-        worth = bits[:, : len(self._ways)] * np.maximum(cosine, 0)
-        return np.asarray(np.sqrt(np.mean(worth.astype(np.float64) ** 2, axis=0)))
+            self._transforms = None
+            if len(self._vertices):
+                self.zones = Zones.about(mesh.positions[self._vertices] + mesh.origin)
+        count = len(self._vertices)
+        if count:
+            points = LitPoints.of(mesh, np.zeros(count, np.int32), self._vertices)
+            self._bits.update(points, casters, self._ways, job)
+            bits = np.unpackbits(self._bits.seen.view(np.uint8), axis=1, bitorder="little")
+            cosine = points.normals @ self._ways.place[0, :, :3].T.astype(np.float32)
+            worth = (bits[:, : len(self._ways)] * np.maximum(cosine, 0)) ** 2
+            share = self.zones.shares(points.positions + points.origin, points.normals).astype(np.float32)
+            self._worth = np.sqrt(share @ worth / share.sum(axis=1, keepdims=True), dtype=np.float64)
+        else:
+            self._worth = np.ones((ZONES, len(self._ways)))
+        self._transforms = casters.transforms
+        return self._worth
 
     def _strange(self, seen: Bools | None) -> bool:
         if seen is None or self._seen is None:
@@ -122,6 +157,8 @@ class SkyChooser:
         self._pilot = Pilot(workers)
         self._drawn: dict[SampleCounts, _Drawn] = {}
         self._version = 0
+        self._transforms: tuple[Transform, ...] | None = None
+        self._last: tuple[LightTree, Power] | None = None
 
     @property
     def nbytes(self) -> int:
@@ -145,55 +182,92 @@ class SkyChooser:
         tree, environment = lighting.tree, lighting.environment
         assert tree is not None
         assert environment is not None
-        radiance = luminance(tree)
-        if not radiance.sum() > 0:
+        power = self._power(tree)
+        if not power.total > 0:
             return None
-        worth = self._pilot.usefulness(mesh, casters, seen, job)
-        wanted = probabilities(radiance, worth)
+        moving, self._transforms = casters.transforms != self._transforms, casters.transforms
+        worth = self._pilot.usefulness(mesh, casters, seen, moving, job)
+        light = (lighting.integrated, environment.id, self._pilot.zones)
         drawn = self._drawn.pop(counts, None)
-        light = (lighting.integrated, environment.id)
-        if (
-            drawn is None
-            or drawn.light != light
-            or _variance(radiance, worth, drawn.probability) > (WORSE * _variance(radiance, worth, wanted))
-        ):
+        if drawn is None or drawn.light != light or drawn.worse(power.cells, worth):
             self._version += 1
-            directions, given = draw(tree, wanted, counts.environment, counts.variants)
+            probability = probabilities(power.cells, worth)
+            directions, given = draw(tree, power, probability, counts.environment, counts.variants)
             samples = distant(directions, given, environment.id, ("sky", self._version))
-            drawn = _Drawn(light, samples, wanted)
+            drawn = _Drawn(light, samples, worth, probability)
         self._drawn[counts] = drawn
         while len(self._drawn) > 2:
             self._drawn.pop(next(iter(self._drawn)))
         return drawn.samples
 
+    def rows(self, mesh: WorldMesh, zones: int, variants: int) -> I32:
+        """(V,) in which row of samples vertices look: those with near numbers in other variants."""
+        own = (np.arange(len(mesh)) * 40503 >> 4) % variants
+        if zones > 1:
+            own += self._pilot.zones.of(mesh.origin, mesh.positions, mesh.normals) * variants
+        return own.astype(np.int32)
 
-def luminance(tree: LightTree) -> F64:
-    """(S,) of the leaves."""
-    return np.asarray(tree.radiance.astype(np.float64) @ np.asarray(LUMINANCE, np.float64))
-
-
-def probabilities(radiance: F64, worth: F64) -> F64:
-    """(S,) by which leaves are drawn, from their radiance and what 2^10 directions are worth; sum 1."""
-    best: F64 = radiance * np.repeat(worth, len(radiance) // len(worth))
-    plain: F64 = radiance / radiance.sum()
-    total = best.sum()
-    if not total > 0:
-        return plain
-    return np.asarray((1 - BY_RADIANCE) / total * best + BY_RADIANCE * plain, np.float64)
+    def _power(self, tree: LightTree) -> Power:
+        if self._last is None or self._last[0] is not tree:
+            self._last = tree, Power.of(tree)
+        return self._last[1]
 
 
-def draw(tree: LightTree, probability: F64, columns: int, variants: int) -> tuple[F64, F32]:
-    """Directions and light (P, C, 3) of systematic samples: P in each of C strata of equal probability."""
-    upto = np.cumsum(probability)
+@dataclass(frozen=True, eq=False)
+class Power:
+    """Luminance of the leaves (S,), its running sum (S + 1,) and that of 2^10 cells."""
+
+    leaves: F64
+    upto: F64
+    cells: F64
+
+    @staticmethod
+    def of(tree: LightTree) -> Power:
+        """That of a tree's leaves."""
+        leaves = tree.radiance.astype(np.float64) @ np.asarray(LUMINANCE, np.float64)
+        upto = np.concatenate([[0.0], np.cumsum(leaves)])
+        return Power(leaves, upto, np.diff(upto[:: len(leaves) >> SMALLEST]))
+
+    @property
+    def total(self) -> float:
+        """All of it."""
+        return float(self.upto[-1])
+
+
+def probabilities(power: F64, worth: F64) -> F64:
+    """(ZONES, 2^10) by which cells are looked into, from their light and what they are worth."""
+    best = power * worth
+    total = best.sum(axis=1, keepdims=True)
+    share = np.where(total > 0, (1 - BY_RADIANCE) / np.where(total > 0, total, 1), 0.0)
+    plain = np.where(total > 0, BY_RADIANCE, 1.0) * power / power.sum()
+    return np.asarray(share * best + plain, np.float64)
+
+
+def draw(tree: LightTree, power: Power, probability: F64, columns: int, variants: int) -> tuple[F64, F32]:
+    """Directions and light (ZONES · P, C, 3): P systematic samples in each of C equally probable strata.
+
+    Within a cell leaves are drawn by their luminance.
+    """
     place = (np.arange(columns) + (shuffles(columns, variants, 3) + 0.5) / variants) / columns
-    leaf = np.minimum(np.searchsorted(upto, place * upto[-1], side="right"), len(upto) - 1)
-    scale = tree.solid_angle / (columns * probability[leaf])
+    inside = len(power.leaves) >> SMALLEST
+    leaves, scales = [], []
+    for own in probability:
+        upto = np.cumsum(own)
+        at = place * upto[-1]
+        cell = np.minimum(np.searchsorted(upto, at, side="right"), len(own) - 1)
+        within = np.clip(1 - (upto[cell] - at) / own[cell], 0.0, 1 - 1e-9)
+        sought = power.upto[cell * inside] + within * power.cells[cell]
+        leaf = np.searchsorted(power.upto, sought, side="right") - 1
+        leaf = np.clip(leaf, cell * inside, cell * inside + inside - 1)
+        leaves.append(leaf)
+        scales.append(power.cells[cell] / own[cell])
+    leaf, scale = np.concatenate(leaves), np.concatenate(scales)
+    scale *= tree.solid_angle / columns / np.maximum(power.leaves[leaf], np.finfo(np.float32).tiny)
     light = tree.radiance[leaf] * scale[..., None]
     return direction_set(tree.k).directions[leaf].astype(np.float64), light.astype(np.float32)
 
 
-def _variance(radiance: F64, worth: F64, probability: F64) -> float:
+def _variance(power: F64, worth: F64, probability: F64) -> float:
     """That of one sample, about."""
-    best: F64 = radiance * np.repeat(worth, len(radiance) // len(worth))
-    lit = probability > 0
+    best, lit = power * worth, probability > 0
     return float((best[lit] ** 2 / probability[lit]).sum())

@@ -17,8 +17,15 @@ from studio_core.scene.nodes import Light, NodeId
 from studio_core.shading.artifacts import Casters, Lighting, Shapes, Surfaces
 from studio_core.transport.light_bits import LightBits, LitPoints
 from studio_core.transport.light_kernels import sum_light
-from studio_core.transport.light_samples import LightSamples, SampleCounts, joined, lamp_samples, sun_samples
+from studio_core.transport.light_samples import (
+    LightSamples,
+    SampleCounts,
+    joined,
+    lamp_samples,
+    sun_samples,
+)
 from studio_core.transport.sky_samples import SkyChooser
+from studio_core.transport.zones import ZONES
 
 F32 = npt.NDArray[np.float32]
 I64 = npt.NDArray[np.int64]
@@ -75,6 +82,8 @@ class SourceLight:
         self._current = LightBits(workers)
         self.samples: LightSamples = joined([], 1)
         """What vertices look at, since the last update."""
+        self.variant: npt.NDArray[np.int32] = np.zeros(0, np.int32)
+        """(V,) and in which row of it."""
 
     @property
     def nbytes(self) -> int:
@@ -100,23 +109,23 @@ class SourceLight:
         The sky is looked at where its light matters to what the vertices `seen` (V,) see, or to all.
         """
         mesh = surfaces.unrefined.mesh
-        variants = samples.variants
-        parts = [lamp_samples(lamp, samples.lamp, variants) for lamp in lighting.lamps]
-        if lighting.environment is not None:
-            node = lighting.environment.id
-            if lighting.sun is not None:
-                key = (lighting.integrated, "sun", samples)
-                parts.append(sun_samples(lighting.sun, samples.lamp, variants, node, key))
-            if lighting.tree is not None and samples.environment > 0:
-                sky = self.sky.choose(mesh, casters, lighting, samples, seen, job)
-                if sky is not None:
-                    parts.append(sky)
-        self.samples = joined(parts, variants)
+        variants, environment, sky = samples.variants, lighting.environment, None
+        if environment is not None and lighting.tree is not None and samples.environment > 0:
+            sky = self.sky.choose(mesh, casters, lighting, samples, seen, job)
+        zones = 1 if sky is None else ZONES
+        parts = [lamp_samples(lamp, samples.lamp, variants, zones) for lamp in lighting.lamps]
+        if environment is not None and lighting.sun is not None:
+            key = (lighting.integrated, "sun", samples)
+            parts.append(sun_samples(lighting.sun, samples.lamp, variants, zones, environment.id, key))
+        if sky is not None:
+            parts.append(sky)
+        self.samples = joined(parts, zones * variants)
+        self.variant = self.sky.rows(mesh, zones, variants)
         bits = self._bits.pop(samples, None) or LightBits(self._workers)
         self._bits[samples] = self._current = bits
         while len(self._bits) > KEPT:
             self._bits.pop(next(iter(self._bits)))
-        return LightCounts(*bits.update(LitPoints.of(mesh), casters, self.samples, job))
+        return LightCounts(*bits.update(LitPoints.of(mesh, self.variant), casters, self.samples, job))
 
     def sums(
         self,
@@ -153,6 +162,7 @@ class SourceLight:
                 mesh.normals,
                 mesh.tangents,
                 samples.kind,
+                self.variant,
                 place,
                 samples.axis,
                 samples.cone,

@@ -34,7 +34,6 @@ from studio_core.shading.job import Job
 from studio_core.shading.offline import scene_view
 from studio_core.shading.pipeline import Pipeline
 from studio_core.shading.stages import SurfaceParams, common_stages
-from studio_core.transport.light_kernels import variant_of
 from studio_core.transport.light_samples import SampleCounts
 from studio_core.transport.source_light import SourceLight
 
@@ -170,8 +169,8 @@ def test_sums_equal_the_plain_loop(services):
     made = world.sums(separated)
     mesh, samples, caster = world.surfaces.mesh, world.light.samples, world.casters.primary
     rows = world.shapes.rows(mesh)
-    of_vertex = [variant_of(v, 4) for v in range(len(mesh))]
-    assert len(set(of_vertex)) == 4
+    of_vertex = world.light.variant
+    assert len(set(of_vertex)) == len(samples.place) == 24
     starts = mesh.positions + mesh.origin + caster.epsilon * mesh.geometric + mesh.inset
     seen = np.zeros((len(mesh), len(samples)), np.bool_)
     for c in range(len(samples)):
