@@ -147,8 +147,7 @@ class LightBits:
                     samples.kind,
                     points.variant,
                     place,
-                    samples.axis,
-                    samples.cone,
+                    samples.lamp,
                     before,
                     now,
                     self.seen,
@@ -167,12 +166,12 @@ class LightBits:
         with np.errstate(invalid="ignore", over="ignore"):
             origins = lifted(self._caster, points.positions + points.origin, points.geometric, points.inset)
         handles = self._caster.handles()
-        counts = np.zeros(len(points), np.int64)
+        counts: list[int] = []
         shift = points.origin - self._caster.centre
         gap = 4 * self._caster.epsilon
 
         def body(start: int, stop: int) -> None:
-            trace_pairs(
+            traced = trace_pairs(
                 handles.occluded8,
                 handles.scene,
                 todo,
@@ -182,25 +181,26 @@ class LightBits:
                 samples.kind,
                 points.variant,
                 place,
-                samples.axis,
-                samples.cone,
+                samples.lamp,
                 shift,
                 gap,
                 self._todo,
                 self.seen,
-                counts,
                 start,
                 stop,
             )
+            counts.append(traced)
 
         self._workers.run(len(todo), max(64, PAIRS_A_CHUNK // max(len(samples), 1)), body, job)
-        rays = int(counts.sum())
+        rays = sum(counts)
         self._caster.count(rays)
         return rays, len(points) * len(samples) - rays
 
 
 def _order(points: LitPoints) -> I32:
     """Points that face alike one after the other, neighbours near each other: their rays go alike."""
+    if not len(points):
+        return np.zeros(0, np.int32)
     facing = (points.normals > 0) @ np.array([1, 2, 4])
     return np.lexsort((morton_codes(points.positions.astype(np.float64)), facing)).astype(np.int32)
 

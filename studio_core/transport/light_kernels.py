@@ -28,25 +28,28 @@ _ONE, _NONE = np.uint64(1), np.uint64(0)
 
 
 @kernel
-def light_at(
-    kind: int, place: F64, axis: F64, cone: F64, x: float, y: float, z: float
+def _arriving(
+    kind: int, px: float, py: float, pz: float, lamp: F64, column: int, x: float, y: float, z: float
 ) -> tuple[float, float, float, float]:
-    """Unit direction from a place to a sample, and the share of its light that arrives there face on."""
+    """Unit direction to a sample at p, and the share of its light that arrives at (x, y, z) face on.
+
+    Rows of lamp (C, 5) are axis and cosines of cone and full cone. (Numbers, not views: these cost more.)
+    """
     if kind == DISTANT:
-        return place[0], place[1], place[2], 1.0
-    dx, dy, dz = place[0] - x, place[1] - y, place[2] - z
-    distance = max(np.sqrt(dx * dx + dy * dy + dz * dz), 1e-6)
-    scale = 1.0 / distance
+        return px, py, pz, 1.0
+    dx, dy, dz = px - x, py - y, pz - z
+    scale = 1.0 / max(np.sqrt(dx * dx + dy * dy + dz * dz), 1e-6)
     dx, dy, dz = dx * scale, dy * scale, dz * scale
     weight = scale * scale
     if kind >= SPOT:
-        cosine = -(dx * axis[0] + dy * axis[1] + dz * axis[2])
+        cosine = -(dx * lamp[column, 0] + dy * lamp[column, 1] + dz * lamp[column, 2])
+        outer, inner = lamp[column, 3], lamp[column, 4]
         if kind == AREA:
             weight *= max(cosine, 0.0)
-        elif cone[1] - cone[0] < 1e-9:
-            weight *= 1.0 if cosine >= cone[0] else 0.0
+        elif inner - outer < 1e-9:
+            weight *= 1.0 if cosine >= outer else 0.0
         else:
-            t = min(max((cosine - cone[0]) / (cone[1] - cone[0]), 0.0), 1.0)
+            t = min(max((cosine - outer) / (inner - outer), 0.0), 1.0)
             weight *= t * t * (3.0 - 2.0 * t)
     return dx, dy, dz, weight
 
@@ -81,55 +84,61 @@ def trace_pairs(
     kind: I8,
     variants: I32,
     place: F64,
-    axis: F64,
-    cone: F64,
+    lamp: F64,
     shift: F64,
     shorten: float,
     todo: U64,
     seen: U64,
-    counts: I64,
     start: int,
     stop: int,
-) -> None:
+) -> int:
     """Looks at all pairs that `todo` (V, W) marks of vertices order[start:stop]; their marks go.
 
     origins (V, 3) are where rays start, about the caster's centre, which lies at −`shift` from the mesh's
-    origin. counts[v] gets the number of rays.
+    origin. Gives the number of rays.
     """
     packet, valid = new_packet()
     packet.view(np.uint32)[MASK, :] = OPAQUE
     who = np.zeros((8, 2), np.int64)
-    used = 0
+    used, rays = 0, 0
     columns = len(kind)
+    near = np.empty((BLOCK, 9), np.float32)
+    marks, row = np.empty(BLOCK, np.uint64), np.empty(BLOCK, np.int32)
     for first in range(start, stop, BLOCK):
-        last = min(first + BLOCK, stop)
+        count = min(BLOCK, stop - first)
+        for i in range(count):
+            v = order[first + i]
+            row[i] = variants[v]
+            for c in range(3):
+                near[i, c], near[i, 3 + c], near[i, 6 + c] = positions[v, c], normals[v, c], origins[v, c]
         for word in range(todo.shape[1]):
             marked = _NONE
-            for at in range(first, last):
-                v = order[at]
-                marked |= todo[v, word]
-                seen[v, word] &= ~todo[v, word]
+            for i in range(count):
+                v = order[first + i]
+                marks[i] = todo[v, word]
+                todo[v, word] = _NONE
+                seen[v, word] &= ~marks[i]
+                marked |= marks[i]
             for column in range(word * 64, min(word * 64 + 64, columns)):
                 bit = _ONE << np.uint64(column & 63)
                 if not marked & bit:
                     continue
-                kind_of, axis_of, cone_of = kind[column], axis[column], cone[column]
-                for at in range(first, last):
-                    v = order[at]
-                    if not todo[v, word] & bit:
+                kind_of = kind[column]
+                for i in range(count):
+                    if not marks[i] & bit:
                         continue
-                    target = place[variants[v], column]
-                    x, y, z = float(positions[v, 0]), float(positions[v, 1]), float(positions[v, 2])
-                    nx, ny, nz = float(normals[v, 0]), float(normals[v, 1]), float(normals[v, 2])
-                    dx, dy, dz, weight = light_at(kind_of, target, axis_of, cone_of, x, y, z)
+                    px, py, pz = place[row[i], column, 0], place[row[i], column, 1], place[row[i], column, 2]
+                    x, y, z = float(near[i, 0]), float(near[i, 1]), float(near[i, 2])
+                    nx, ny, nz = float(near[i, 3]), float(near[i, 4]), float(near[i, 5])
+                    dx, dy, dz, weight = _arriving(kind_of, px, py, pz, lamp, column, x, y, z)
                     if not (weight > 0.0 and dx * nx + dy * ny + dz * nz > 0.0):
                         continue
-                    ox, oy, oz = origins[v, 0], origins[v, 1], origins[v, 2]
+                    ox, oy, oz = near[i, 6], near[i, 7], near[i, 8]
                     far = np.float32(np.inf)
                     if kind_of != DISTANT:  # from where the ray starts
-                        dx = target[0] + shift[0] - ox
-                        dy = target[1] + shift[1] - oy
-                        dz = target[2] + shift[2] - oz
+                        dx = px + shift[0] - ox
+                        dy = py + shift[1] - oy
+                        dz = pz + shift[2] - oz
                         length = np.sqrt(dx * dx + dy * dy + dz * dz)
                         if not (length > 0.0 and dx * nx + dy * ny + dz * nz > 0.0):
                             continue
@@ -142,22 +151,24 @@ def trace_pairs(
                     packet[DIRECTION + 1, used] = dy
                     packet[DIRECTION + 2, used] = dz
                     packet[TFAR, used] = far
-                    who[used, 0], who[used, 1] = v, column
-                    counts[v] += 1
+                    who[used, 0], who[used, 1] = order[first + i], column
                     used += 1
+                    rays += 1
                     if used == 8:
                         _send(occluded8, scene, packet, valid, used, who, seen)
                         used = 0
-            for at in range(first, last):
-                todo[order[at], word] = _NONE
     if used > 0:
         _send(occluded8, scene, packet, valid, used, who, seen)
+    return rays
 
 
 @kernel
-def _meets(dx: float, dy: float, dz: float, far: float, x: float, y: float, z: float, sphere: F64) -> bool:
-    """Whether the way from (x, y, z) along a unit direction as far as `far` passes a sphere (4,)."""
-    cx, cy, cz, square = sphere[0] - x, sphere[1] - y, sphere[2] - z, sphere[3] * sphere[3]
+def _meets(
+    dx: float, dy: float, dz: float, far: float, x: float, y: float, z: float, spheres: F64, s: int
+) -> bool:
+    """Whether the way from (x, y, z) along a unit direction as far as `far` passes sphere s."""
+    cx, cy, cz = spheres[s, 0] - x, spheres[s, 1] - y, spheres[s, 2] - z
+    square = spheres[s, 3] * spheres[s, 3]
     along = cx * dx + cy * dy + cz * dz
     apart = cx * cx + cy * cy + cz * cz
     if apart <= square:
@@ -174,8 +185,7 @@ def mark_moved(
     kind: I8,
     variants: I32,
     place: F64,
-    axis: F64,
-    cone: F64,
+    lamp: F64,
     before: F64,
     now: F64,
     seen: U64,
@@ -197,21 +207,20 @@ def mark_moved(
             word, bit = column >> 6, _ONE << np.uint64(column & 63)
             if todo[v, word] & bit:
                 continue
-            target = place[variant, column]
+            dx, dy, dz = place[variant, column, 0], place[variant, column, 1], place[variant, column, 2]
             far = np.inf
             if kind[column] == DISTANT:
-                dx, dy, dz = target[0], target[1], target[2]
                 if dx * nx + dy * ny + dz * nz <= 0.0:
                     continue
             else:
-                dx, dy, dz = target[0] - x, target[1] - y, target[2] - z
+                dx, dy, dz = dx - x, dy - y, dz - z
                 if dx * nx + dy * ny + dz * nz <= 0.0:
                     continue
                 far = max(np.sqrt(dx * dx + dy * dy + dz * dz), 1e-6)
                 dx, dy, dz = dx / far, dy / far, dz / far
             spheres = now if seen[v, word] & bit else before
             for sphere in range(len(spheres)):
-                if _meets(dx, dy, dz, far, x, y, z, spheres[sphere]):
+                if _meets(dx, dy, dz, far, x, y, z, spheres, sphere):
                     todo[v, word] |= bit
                     break
 
@@ -234,8 +243,7 @@ def sum_light(
     kind: I8,
     variants: I32,
     place: F64,
-    axis: F64,
-    cone: F64,
+    lamp: F64,
     light: F32,
     seen: U64,
     row: I32,
@@ -278,8 +286,16 @@ def sum_light(
                 bits >>= _ONE
                 if not here:
                     continue
-                dx, dy, dz, weight = light_at(
-                    kind[column], place[variant, column], axis[column], cone[column], x, y, z
+                dx, dy, dz, weight = _arriving(
+                    kind[column],
+                    place[variant, column, 0],
+                    place[variant, column, 1],
+                    place[variant, column, 2],
+                    lamp,
+                    column,
+                    x,
+                    y,
+                    z,
                 )
                 cosine = axes[2, 0] * dx + axes[2, 1] * dy + axes[2, 2] * dz
                 if cosine <= 0.0:

@@ -40,16 +40,15 @@ class SampleCounts:
 class LightSamples:
     """Samples of one light, or of several: P rows, variants for each zone of the scene, of C columns.
 
-    place (P, C, 4): (x, y, z, 1) in the world, (x, y, z, 0) a unit direction towards the light. kind (C,),
-    axis (C, 3) and cone (C, 2), cosines of cone and full cone, say how its light falls off. light (P, C, 3)
+    place (P, C, 4): (x, y, z, 1) in the world, (x, y, z, 0) a unit direction towards the light. kind (C,) and
+    lamp (C, 5), its axis and the cosines of cone and full cone, say how its light falls off. light (P, C, 3)
     is what the light of `owner[c]` gives at unit gain to a surface that faces it: at 1 m, of lamps. Equal
     `keys`, one for each group of columns (and how many there are), mean equal places.
     """
 
     place: F64
     kind: npt.NDArray[np.int8]
-    axis: F64
-    cone: F64
+    lamp: F64
     light: F32
     owner: tuple[NodeId, ...]
     keys: tuple[tuple[Hashable, int], ...]
@@ -83,8 +82,7 @@ def joined(parts: Sequence[LightSamples], rows: int) -> LightSamples:
         return LightSamples(
             none,
             np.zeros(0, np.int8),
-            np.zeros((0, 3)),
-            np.zeros((0, 2)),
+            np.zeros((0, 5)),
             np.zeros((rows, 0, 3), np.float32),
             (),
             (),
@@ -92,8 +90,7 @@ def joined(parts: Sequence[LightSamples], rows: int) -> LightSamples:
     return LightSamples(
         np.concatenate([part.place for part in parts], axis=1),
         np.concatenate([part.kind for part in parts]),
-        np.concatenate([part.axis for part in parts]),
-        np.concatenate([part.cone for part in parts]),
+        np.concatenate([part.lamp for part in parts]),
         np.concatenate([part.light for part in parts], axis=1),
         tuple(node for part in parts for node in part.owner),
         tuple(key for part in parts for key in part.keys),
@@ -106,8 +103,7 @@ def distant(directions: F64, light: npt.NDArray[np.floating], owner: NodeId, key
     return LightSamples(
         np.concatenate([directions, np.zeros((variants, count, 1))], axis=2),
         np.full(count, DISTANT, np.int8),
-        np.zeros((count, 3)),
-        np.zeros((count, 2)),
+        np.zeros((count, 5)),
         np.asarray(light, np.float32),
         (owner,) * count,
         ((key, count),),
@@ -141,8 +137,7 @@ def lamp_samples(lamp: Lamp, samples: int, variants: int, zones: int) -> LightSa
     return LightSamples(
         np.tile(places, (zones, 1, 1)),
         np.full(columns, _KINDS[lamp.kind], np.int8),
-        np.tile(lamp.axis, (columns, 1)),
-        np.tile([lamp.cos_cone, lamp.cos_inner], (columns, 1)),
+        np.tile([*lamp.axis, lamp.cos_cone, lamp.cos_inner], (columns, 1)),
         np.full((rows, columns, 3), share, np.float32),
         (lamp.node,) * columns,
         (((lamp.kind, *numbers, variants), columns),),

@@ -96,7 +96,8 @@ class Pilot:
         The same array where nothing has changed; while things are `moving`, it may be as it was before.
         """
         elsewhere = casters.primary is not self._caster or self._strange(seen)
-        if not elsewhere and (moving or casters.transforms == self._transforms):
+        known = self._transforms is not None and not elsewhere  # else it is new, or was cancelled
+        if known and (moving or casters.transforms == self._transforms):
             return self._worth
         if elsewhere:
             self._vertices = self._points(mesh, casters.primary, seen, job)

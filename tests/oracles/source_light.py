@@ -18,12 +18,12 @@ def arriving(samples: Any, column: int, variant: int, position: F64) -> tuple[F6
         return place[:3], 1.0, math.inf
     way = place[:3] - position
     far = max(float(np.linalg.norm(way)), 1e-6)
-    cosine = float(-(way / far) @ samples.axis[column])
+    cosine = float(-(way / far) @ samples.lamp[column, :3])
     share = 1.0
     if samples.kind[column] == 3:
         share = max(cosine, 0.0)
     elif samples.kind[column] == 2:
-        outer, inner = samples.cone[column]
+        outer, inner = samples.lamp[column, 3:]
         if inner - outer < 1e-9:
             share = float(cosine >= outer)
         else:
