@@ -7,7 +7,7 @@ somebody does, and what an undone move brings back is known already.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, TypeAlias
 
@@ -21,7 +21,8 @@ from studio_core.scene.tessellate import morton_codes
 from studio_core.scene.transform import Transform
 from studio_core.scene.world_mesh import WorldMesh
 from studio_core.shading.artifacts import Casters, Surfaces
-from studio_core.transport.hits import HitTable
+from studio_core.transport.cells import CELLS
+from studio_core.transport.hits import BLACK, NOTHING, HitTable
 from studio_core.transport.patterns import Pattern, variants_of
 from studio_core.transport.trace_rows import ASKED, COUNTS, TRACED, update_rows
 
@@ -34,6 +35,8 @@ Poses: TypeAlias = tuple[Transform, ...]
 NEVER = -1
 RAYS_A_CHUNK = 1 << 12
 LIMIT = 96 << 20
+VERSION = 1
+"""Of what kept rows mean."""
 _ARRAYS = ("rows", "black", "touched", "_epoch", "_seen", "variant", "_stream")
 
 
@@ -59,9 +62,10 @@ class Rows:
     current (R,) tells.
     """
 
-    def __init__(self, workers: Workers, rays: int) -> None:
+    def __init__(self, workers: Workers, rays: int, salt: int = 0) -> None:
         self._workers = workers
         self._rays = rays
+        self._salt = salt  # tells the chances of one operator from those of another
         self._casters: tuple[object, ...] = ()
         self._meshes: tuple[ShadingMesh, ...] = ()
         self._poses: dict[int, Poses] = {}
@@ -163,7 +167,7 @@ class Rows:
             "_epoch": np.full(count, NEVER, np.int32),
             "_seen": np.zeros(count, np.uint64),
             "variant": variant,
-            "_stream": vertices,
+            "_stream": vertices + self._salt,
         }
         for name, values in fresh.items():
             setattr(self, name, np.concatenate([getattr(self, name), values]))
@@ -243,7 +247,7 @@ class Transport(Rows):
     """
 
     def __init__(self, workers: Workers, pattern: Pattern, limit: int = LIMIT) -> None:
-        super().__init__(workers, pattern.rays)
+        super().__init__(workers, pattern.rays, int(pattern.key[:15], 16))
         self.pattern = pattern
         self._limit = limit
 
@@ -268,12 +272,45 @@ class Transport(Rows):
         self._ended = True
         return made
 
+    # -- to keep elsewhere -------------------------------------------------------------------------
+
+    def key(self, casters: Casters) -> tuple[object, ...]:
+        """What kept rows depend on: the pattern, the meshes and what of them stops light, where objects stand."""
+        return (VERSION, self.pattern.key, casters.meshes, casters.transforms)
+
+    def to_arrays(self) -> dict[str, npt.NDArray[Any]]:
+        """The rows that are up to date; for the poses of the last update."""
+        some = np.flatnonzero(self.current)
+        names = ("vertex", "cell", "distance")
+        kept = dict(zip(names, self.table[some].arrays, strict=True))
+        return {"rows": self.rows[some], **kept}
+
+    def from_arrays(
+        self, surfaces: Surfaces, casters: Casters, arrays: Mapping[str, npt.NDArray[Any]]
+    ) -> bool:
+        """Takes over rows that were kept under the same `key`, in place of all others; False where they cannot
+        be that, and nothing has changed."""
+        mesh = surfaces.unrefined.mesh
+        if not _fits(arrays, mesh, self._rays):
+            return False
+        self._turn_to(mesh, casters)
+        self._clear_rows()
+        rows = np.array(arrays["rows"], np.int64)
+        self._append(rows, variants_of(rows, self.pattern.variants))
+        self.table = HitTable(*(np.array(arrays[name]) for name in ("vertex", "cell", "distance")))
+        inside, lit = self.table.vertex == BLACK, self.table.vertex < len(mesh)
+        things = np.where(inside, self.table.cell, mesh.object[np.where(lit, self.table.vertex, 0)])
+        bits = np.where(
+            lit | inside, np.left_shift(np.uint64(1), things.astype(np.uint64) & np.uint64(63)), 0
+        )
+        self._seen = np.bitwise_or.reduce(bits.astype(np.uint64), axis=1)
+        self.black = inside.sum(axis=1).astype(np.uint16)
+        self._epoch[:] = self._now
+        return True
+
 
 class RayTransport(Rows):
     """Rays that somebody chose, such as those of a view's lobes: `rays` of each row."""
-
-    def __init__(self, workers: Workers, rays: int) -> None:
-        super().__init__(workers, rays)
 
     def _clear(self, vertices: int) -> None:
         super()._clear(vertices)
@@ -322,6 +359,24 @@ class RayTransport(Rows):
                 getattr(self, name)[same] = before[name][found[same]]
         for array, then in zip(self.table.arrays, table.arrays, strict=True):
             array[same] = then[found[same]]
+
+
+def _fits(arrays: Mapping[str, npt.NDArray[Any]], mesh: WorldMesh, rays: int) -> bool:
+    """Whether these can be hits of vertices of a mesh."""
+    types = {"rows": np.int64, "vertex": np.uint32, "cell": np.uint16, "distance": np.float16}
+    if arrays.keys() != types.keys() or any(arrays[name].dtype != kind for name, kind in types.items()):
+        return False
+    rows, vertex, cell = arrays["rows"], arrays["vertex"], arrays["cell"]
+    if rows.ndim != 1 or any(arrays[n].shape != (len(rows), rays) for n in ("vertex", "cell", "distance")):
+        return False
+    lit, special = vertex < len(mesh), (vertex == NOTHING) | (vertex == BLACK)
+    return bool(
+        len(np.unique(rows)) == len(rows)
+        and ((rows >= 0) & (rows < len(mesh))).all()
+        and (lit | special).all()
+        and (cell[lit] < CELLS).all()
+        and (arrays["distance"] >= 0).all()
+    )
 
 
 def _coherent(mesh: WorldMesh, vertices: I64) -> I64:

@@ -46,6 +46,7 @@ TRACED, ASKED = range(COUNTS)
 """Columns of counts: rays traced against the scene, and against one object alone."""
 
 _MIX = np.uint64(0x9E3779B97F4A7C15)
+_BLEND = np.uint64(0xD1B54A32D192ED03)
 _STIR = np.uint64(0xD6E8FEB86659FD93)
 _HALF_WORD = np.uint64(32)
 
@@ -53,8 +54,7 @@ _HALF_WORD = np.uint64(32)
 @kernel
 def chance(stream: int, ray: int) -> float:
     """A number in [0, 1) of its own for every ray of every stream."""
-    z = (np.uint64(stream) << np.uint64(24)) + np.uint64(ray) + np.uint64(1)
-    z *= _MIX
+    z = np.uint64(stream) * _MIX + np.uint64(ray + 1) * _BLEND
     z = (z ^ (z >> _HALF_WORD)) * _STIR
     z = (z ^ (z >> _HALF_WORD)) * _STIR
     return np.float64(z >> np.uint64(40)) * (1.0 / 16777216.0)

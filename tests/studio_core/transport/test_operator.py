@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,7 @@ from studio_core.errors import Cancelled
 from studio_core.parallel import Workers
 from studio_core.scene.nodes import MeshObject
 from studio_core.scene.transform import Transform
+from studio_core.shading.cache import DiskCache
 from studio_core.shading.job import Job
 from studio_core.transport.hits import BLACK, NOTHING, gather_matte
 from studio_core.transport.operator import RayTransport, Rows, Transport
@@ -322,7 +324,8 @@ def test_other_meshes_begin_anew(workers: Workers) -> None:
 def test_chosen_rays_meet_what_a_pattern_meets(workers: Workers) -> None:
     rng = np.random.default_rng(3)
     stand = Stand(furnished(), 1200)
-    transport, chosen = Transport(workers, PATTERN), RayTransport(workers, 16)
+    transport = Transport(workers, PATTERN)
+    chosen = RayTransport(workers, 16, int(PATTERN.key[:15], 16))
     update(transport, stand)
     some = rng.permutation(len(transport))[:400]
     vertices = transport.rows[some]
@@ -344,7 +347,7 @@ def test_chosen_rays_meet_what_a_pattern_meets(workers: Workers) -> None:
         stand.place(stool=somewhere(rng, scale=0.5))
         after = chosen.update(stand.surfaces, stand.casters, vertices[keep], turned[keep], None)
         assert after.rays < 300 * 16
-    fresh = RayTransport(workers, 16)
+    fresh = RayTransport(workers, 16, int(PATTERN.key[:15], 16))
     fresh.update(stand.surfaces, stand.casters, vertices[keep], turned[keep], None)
     assert np.mean(fresh.table.vertex != chosen.table.vertex) < 2e-3
     none = np.zeros((5, 16, 3), np.float32)
@@ -352,3 +355,36 @@ def test_chosen_rays_meet_what_a_pattern_meets(workers: Workers) -> None:
     assert (chosen.table.vertex == NOTHING).all()
     with pytest.raises(ValueError, match="shape"):
         chosen.update(stand.surfaces, stand.casters, vertices, none, None)
+
+
+def test_kept_rows_are_taken_over(workers: Workers, tmp_path: Path) -> None:
+    """Through a cache on disk: no ray is traced, and moves go on from there."""
+    rng = np.random.default_rng(9)
+    stand = Stand(furnished(), 1200)
+    transport = Transport(workers, PATTERN)
+    update(transport, stand)
+    cache = DiskCache(tmp_path)
+    cache.put(transport.to_arrays(), "rows", *transport.key(stand.casters))
+    again = Stand(furnished(), 1200)
+    taken = Transport(workers, PATTERN)
+    found = cache.get("rows", *taken.key(again.casters))
+    assert found is not None
+    assert taken.from_arrays(again.surfaces, again.casters, found)
+    assert update(taken, again).rays == 0
+    assert (by_vertex(taken)[0] == by_vertex(transport)[0]).all()
+    assert (
+        taken.share_back[np.argsort(taken.rows)] == transport.share_back[np.argsort(transport.rows)]
+    ).all()
+    again.place(ball=somewhere(rng), stool=somewhere(rng, scale=0.5))
+    assert 0 < update(taken, again).rays < 16 * len(again.mesh)
+    fresh = Transport(workers, PATTERN)
+    update(fresh, again)
+    assert compare(taken, fresh, again.mesh)[0] < 1e-4
+    assert cache.get("rows", *taken.key(again.casters)) is None
+    assert cache.get("rows", *Transport(workers, cosine_pattern(16, seed=1)).key(stand.casters)) is None
+    for name, value in (("vertex", 10**6), ("cell", 5000), ("rows", -1), ("distance", np.nan)):
+        damaged = {key: array.copy() for key, array in found.items()}
+        damaged[name].reshape(-1)[damaged["vertex"].reshape(-1).argmin() if name != "rows" else 0] = value
+        assert not taken.from_arrays(stand.surfaces, stand.casters, damaged)
+    assert not taken.from_arrays(stand.surfaces, stand.casters, {})
+    assert not taken.from_arrays(stand.surfaces, stand.casters, {**found, "cell": found["cell"][:, :8]})
