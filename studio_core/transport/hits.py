@@ -19,6 +19,8 @@ NOTHING = 0xFFFFFFFF
 """A ray that leaves the scene."""
 BLACK = 0xFFFFFFFE
 """A ray that meets the inside of a closed part, which has no vertices."""
+GONE = 0xFFFFFFFD
+"""Between updates: a ray that met what is there no more."""
 NO_OBJECT = 0xFFFF
 _SMALLER, _LARGER = np.float32(2.0**-112), np.float32(2.0**112)
 _INFINITE = 0x7C00
@@ -112,4 +114,4 @@ def gather_matte(
         out[row, 0], out[row, 1], out[row, 2] = red / rays, green / rays, blue / rays
 
 
-__all__ = ["BLACK", "NOTHING", "NO_OBJECT", "HitTable", "gather_matte", "half_bits", "half_value"]
+__all__ = ["BLACK", "GONE", "NOTHING", "NO_OBJECT", "HitTable", "gather_matte", "half_bits", "half_value"]

@@ -12,25 +12,17 @@ import numpy.typing as npt
 from studio_core.jit import call_address, kernel
 from studio_core.kernels.packets import (
     DIRECTION,
-    GEOMETRY,
-    INSTANCE,
     MASK,
-    NO_HIT,
-    NORMAL,
     OPAQUE,
     ORIGIN,
-    PRIMITIVE,
     TFAR,
-    U,
-    V,
     clear_hits,
     new_packet,
 )
 from studio_core.kernels.radiance import surface_frame
-from studio_core.scene.shading_mesh import NO_BACK
-from studio_core.transport.cells import cell_of
-from studio_core.transport.hits import BLACK, NO_OBJECT, NOTHING, half_bits
+from studio_core.transport.hits import BLACK, GONE, NO_OBJECT, NOTHING, half_bits
 from studio_core.transport.moved_rays import TRACE, answer, ask
+from studio_core.transport.settle import settle
 
 F32 = npt.NDArray[np.float32]
 F64 = npt.NDArray[np.float64]
@@ -44,20 +36,6 @@ U64 = npt.NDArray[np.uint64]
 COUNTS = 2
 TRACED, ASKED = range(COUNTS)
 """Columns of counts: rays traced against the scene, and against one object alone."""
-
-_MIX = np.uint64(0x9E3779B97F4A7C15)
-_BLEND = np.uint64(0xD1B54A32D192ED03)
-_STIR = np.uint64(0xD6E8FEB86659FD93)
-_HALF_WORD = np.uint64(32)
-
-
-@kernel
-def chance(stream: int, ray: int) -> float:
-    """A number in [0, 1) of its own for every ray of every stream."""
-    z = np.uint64(stream) * _MIX + np.uint64(ray + 1) * _BLEND
-    z = (z ^ (z >> _HALF_WORD)) * _STIR
-    z = (z ^ (z >> _HALF_WORD)) * _STIR
-    return np.float64(z >> np.uint64(40)) * (1.0 / 16777216.0)
 
 
 @kernel
@@ -86,66 +64,6 @@ def _prepare(
         origin[axis] = float(positions[v, axis]) + epsilon * float(geometric[v, axis]) + float(inset[v, axis])
         size += abs(origin[axis]) + abs(axes[0, axis]) + abs(axes[1, axis]) + abs(axes[2, axis])
     return bool(size < np.inf)
-
-
-@kernel
-def _settle(
-    used: int,
-    row_of: I64,
-    ray_of: I64,
-    along: F64,
-    packet: F32,
-    valid: I32,
-    stream: I64,
-    face_start: I64,
-    face_ids: I32,
-    turns: F32,
-    face_offsets: I64,
-    faces: U32,
-    back_faces: U32,
-    normals: F32,
-    tangents: F32,
-    word: U32,
-    vertex: U32,
-    cell: U16,
-    distance: U16,
-    touched: npt.NDArray[np.bool_],
-) -> None:
-    """Writes what the rays of a packet met."""
-    words = packet.view(np.uint32)
-    for lane in range(used):
-        row, ray = row_of[lane], ray_of[lane]
-        met, seen, far = np.int64(NOTHING), 0, _far()
-        if valid[lane] != 0 and words[GEOMETRY, lane] != NO_HIT:
-            thing = np.int64(words[INSTANCE, lane])
-            slot = face_start[thing, np.int64(words[GEOMETRY, lane])] + np.int64(words[PRIMITIVE, lane])
-            face = face_offsets[thing] + face_ids[slot]
-            dx, dy, dz = along[lane, 0], along[lane, 1], along[lane, 2]
-            m = turns[thing]
-            # the sign of the world's normal along the ray: Ng · (Mᵀ d)
-            facing = np.float64(packet[NORMAL, lane]) * (m[0, 0] * dx + m[1, 0] * dy + m[2, 0] * dz)
-            facing += np.float64(packet[NORMAL + 1, lane]) * (m[0, 1] * dx + m[1, 1] * dy + m[2, 1] * dz)
-            facing += np.float64(packet[NORMAL + 2, lane]) * (m[0, 2] * dx + m[1, 2] * dy + m[2, 2] * dz)
-            u, v = packet[U, lane], packet[V, lane]
-            number = chance(stream[row], ray)
-            corner = 1 if number < u else (2 if number < u + v else 0)
-            met = np.int64(faces[face, corner] if facing < 0 else back_faces[face, corner])
-            far = packet[TFAR, lane]
-            if met == NO_BACK:
-                met, seen = np.int64(BLACK), int(thing) if thing < NO_OBJECT else NO_OBJECT
-            else:
-                nx, ny, nz = normals[met, 0], normals[met, 1], normals[met, 2]
-                tx, ty, tz = tangents[met, 0], tangents[met, 1], tangents[met, 2]
-                sense = -tangents[met, 3]
-                seen = cell_of(
-                    -(tx * dx + ty * dy + tz * dz),
-                    sense * ((ny * tz - nz * ty) * dx + (nz * tx - nx * tz) * dy + (nx * ty - ny * tx) * dz),
-                    -(nx * dx + ny * dy + nz * dz),
-                )
-        if vertex[row, ray] != met or cell[row, ray] != seen:
-            touched[row] = True
-            vertex[row, ray], cell[row, ray] = met, seen
-        distance[row, ray] = half_bits(far, word)
 
 
 @kernel
@@ -208,7 +126,7 @@ def _follow(
                     valid[lane] = 0
                 clear_hits(packet)
                 call_address(intersect8, valid, scene, packet, 0)
-                _settle(
+                settle(
                     used,
                     row_of,
                     ray_of,
@@ -232,11 +150,6 @@ def _follow(
                 )
                 used = 0
     return traced
-
-
-@kernel
-def _far() -> np.float32:
-    return np.float32(np.inf)
 
 
 @kernel
@@ -278,6 +191,7 @@ def update_rows(
     cell: U16,
     distance: U16,
     things_seen: U64,
+    holes: npt.NDArray[np.bool_],
     black: U16,
     touched: npt.NDArray[np.bool_],
     counts: I64,
@@ -290,8 +204,9 @@ def update_rows(
     are the pattern and the chance of a row, receiver (R,) its vertex.
     part_scene, from_mesh (n, 3, 4), centre (n, 3) relative to the mesh's origin and radius are the objects
     alone; shift leads from the mesh's origin to the caster's centre.
-    things_seen (R,) gets a bit for each object that a row meets (its number mod 64), black (R,) how many
-    rays met the inside of a closed part, touched (R,) whether a hit is another.
+    Of `holes` (R,) the rays that met what is GONE are traced too. things_seen (R,) gets a bit for each object
+    that a row meets (its number mod 64), black (R,) how many rays met the inside of a closed part, touched
+    (R,) whether a hit is another.
     """
     count = stop - start
     rays = directions.shape[1]
@@ -340,12 +255,14 @@ def update_rows(
         if whole[s] or moved_here[thing_of[receiver[row]]]:
             marks[column] = TRACE
             marked[column] = True
-        elif things_seen[row] & bits != np.uint64(0):
+        elif holes[row] or things_seen[row] & bits != np.uint64(0):
             for ray in range(rays):
                 met = np.int64(vertex[row, ray])
                 if met == NOTHING:
                     continue
-                thing = np.int64(cell[row, ray]) if met == BLACK else np.int64(thing_of[met])
+                thing = np.int64(NO_OBJECT)
+                if met != GONE:
+                    thing = np.int64(cell[row, ray]) if met == BLACK else np.int64(thing_of[met])
                 if thing >= NO_OBJECT or moved_here[thing]:
                     marks[column, ray] = TRACE
                     marked[column] = True

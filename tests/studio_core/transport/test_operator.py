@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import contextlib
+import dataclasses
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from oracles import transport as oracle
-from oracles.meshes import joined
+from oracles.meshes import box, joined
 from transport_support import Stand, ball, furnished, scene_of, somewhere, thing, walls
 
 from studio_core.errors import Cancelled
@@ -309,16 +311,90 @@ def test_rows_that_nobody_wants_go_where_room_is_short(workers: Workers) -> None
     assert transport.nbytes < 1.2 * count * 16 * 8
 
 
-def test_other_meshes_begin_anew(workers: Workers) -> None:
-    stand = Stand(furnished(), 1200)
+def retraced(workers: Workers, known: Transport, stand: Stand) -> Transport:
+    """The rays that `known` has, all traced afresh: vertices had other numbers when they were chosen."""
+    made = Transport(workers, known.pattern)
+    update(made, stand, ~stand.all())
+    made._append(known.rows, known.variant)
+    made._stream = known._stream.copy()
+    update(made, stand)
+    return made
+
+
+def test_objects_that_come_and_go_leave_the_rest(workers: Workers) -> None:
+    """Added, removed, made anew, turned to glass, with moves and cancelled updates between."""
+    rng = np.random.default_rng(21)
+    first = furnished()
+    others = [
+        thing("lamp", ball(0.2, 8), (0.0, 1.2, 0.0)),
+        thing("cube", box((0.5, 0.5, 0.5)), (-0.4, 0.0, 0.8)),
+        thing("pane", box((1.0, 1.0, 0.02)), (0.2, 0.1, 0.0), "glass"),
+    ]
+    every = [*first.of(MeshObject), *others]
+    stand = Stand(first, 1500)
     transport = Transport(workers, PATTERN)
     update(transport, stand)
-    stand.follow(scene_of(*(node for node in stand.scene.of(MeshObject) if node.id != "ball")))
+    shares = []
+    for number in range(30):
+        shown = [node for node in every if node.id == "room" or rng.random() < 0.7]
+        if number % 3 == 1:
+            shown = list(stand.scene.of(MeshObject))
+            change = int(rng.integers(1, len(shown)))
+            material = "glass" if shown[change].materials == ("matt",) else "matt"
+            shown[change] = dataclasses.replace(shown[change], materials=(material,))
+        before = {(o.node, id(o.mesh)) for o in stand.mesh.objects}
+        stand.follow(scene_of(*shown))
+        if number % 2:
+            name = str(rng.choice([node.id for node in shown[1:]] or ["room"]))
+            stand.place(**{name: Transform((0, 0.017, 0)) @ somewhere(rng, scale=0.6)})
+        if number % 5 == 4:
+            with contextlib.suppress(Cancelled):
+                update(transport, stand, job=Impatient(2))
+        counts = update(transport, stand)
+        assert len(transport) == len(stand.mesh)
+        assert transport.current.all()
+        if before & {(o.node, id(o.mesh)) for o in stand.mesh.objects}:
+            shares.append(counts.rays / (16 * len(stand.mesh)))
+        fresh = retraced(workers, transport, stand)
+        differing, _ = compare(transport, fresh, stand.mesh)
+        assert differing < 2e-4
+        black, seen = transport.black.copy(), transport._seen.copy()
+        transport._look(stand.mesh)  # as told by the hits that there are
+        assert (black == transport.black).all()
+        assert (seen == transport._seen).all()
+    assert np.mean(shares) < 0.7
+
+
+def test_what_comes_and_goes_is_all_that_is_traced(workers: Workers) -> None:
+    bulb = thing("bulb", ball(0.15, 4), (0.2, 1.0, 0.0))
+    stand = Stand(scene_of(*furnished().of(MeshObject), bulb), 2000)
+    transport = Transport(workers, PATTERN)
     update(transport, stand)
-    fresh = Transport(workers, PATTERN)
-    update(fresh, stand)
-    assert len(transport) == len(stand.mesh)
-    assert compare(transport, fresh, stand.mesh)[0] == 0
+    known = {placed.node: placed.mesh for placed in stand.mesh.objects}
+    stand.follow(furnished())
+    assert all(known[placed.node] is placed.mesh for placed in stand.mesh.objects)
+    assert update(transport, stand).rays < 0.05 * 16 * len(stand.mesh)
+    assert transport.touched.all()  # numbers of vertices are others
+    assert not update(transport, stand).rays
+    stand.follow(stand.scene.with_nodes(bulb))
+    own = int((stand.mesh.object == stand.mesh.index_of("bulb")).sum())
+    assert 16 * own < update(transport, stand).rays < 16 * own + 0.05 * 16 * len(stand.mesh)
+
+
+def test_chosen_rays_follow_objects_that_come_and_go(workers: Workers) -> None:
+    rng = np.random.default_rng(2)
+    stand = Stand(furnished(), 1500)
+    chosen = RayTransport(workers, 16)
+    ways = rng.normal(size=(len(stand.mesh), 16, 3))
+    ways = (ways / np.linalg.norm(ways, axis=2, keepdims=True)).astype(np.float32)
+    room = np.flatnonzero(stand.mesh.object == 0)  # the first: its vertices keep their numbers
+    chosen.update(stand.surfaces, stand.casters, np.arange(len(stand.mesh)), ways, None)
+    stand.follow(scene_of(*(node for node in stand.scene.of(MeshObject) if node.id != "hoop")))
+    counts = chosen.update(stand.surfaces, stand.casters, room, ways[room], None)
+    assert 0 < counts.rays < 0.2 * room.size * 16
+    fresh = RayTransport(workers, 16)
+    fresh.update(stand.surfaces, stand.casters, room, ways[room], None)
+    assert compare(chosen, fresh, stand.mesh)[0] < 1e-4
 
 
 def test_chosen_rays_meet_what_a_pattern_meets(workers: Workers) -> None:
