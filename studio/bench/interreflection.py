@@ -39,10 +39,11 @@ F64 = npt.NDArray[np.float64]
 BACKEND = "cuts"
 METHODS = {"": "gather", "paper/": "fields"}
 IN_PARTS = True
-PARTS: tuple[str, ...] = ("studio.bench.interreflection_operator",)
+PARTS = ("studio.bench.interreflection_furnace", "studio.bench.interreflection_operator")
 """Modules with further cases: each has `run(report, program, setup)`."""
 BOUNCES = 3
-WALL = "wall"
+SURER = 8
+"""Times as many paths where tints are judged."""
 TIERS = ("moving", "rest")
 
 
@@ -185,12 +186,13 @@ class Case:
         editor = self.editor("shared")
         tracer = TruthTracer(
             self.program.services,
-            self.setup.paths,
+            self.setup.paths * (SURER if self.one.tinted else 1),
             BOUNCES,
             None if self.setup.cache is None else DiskCache(self.setup.cache),
         )
         found: dict[str, list[float]] = {}
         settled: list[float] = []
+        least = np.inf
         for number, scene in enumerate(poses(self.one, self.setup.poses)):
             self.say(f"pose {number}")
             editor.go(scene, True)
@@ -204,15 +206,16 @@ class Case:
             settled.append(step.between)
             made["rest"] = editor.light(places)
             truth = tracer(scene, self.eye, editor.pipeline, places)
-            walls = np.array([name == WALL for name in surfaces.materials])[
-                surfaces.mesh.material[places.rows]
-            ]
+            tinted = np.array([name == self.one.tinted for name in surfaces.materials])
+            walls = tinted[surfaces.mesh.material[places.rows]]
             for tier, light in made.items():
+                least = min(least, float(light.irradiance.min()))
                 for metric, value in errors_of(light, truth, walls).items():
                     found.setdefault(f"{metric}_{tier}", []).append(value)
         for metric, values in found.items():
             self.add(metric, float(np.mean(values)), "1", float(np.std(values)))
             self.add(f"{metric}_worst", float(np.max(values)), "1")
+        self.add("least_irradiance", least, "1")
         self.add("s_rest", float(np.median(settled)), "s", float(np.std(settled)))
         self.details["errors"] = {metric: [round(v, 5) for v in values] for metric, values in found.items()}
 

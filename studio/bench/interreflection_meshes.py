@@ -43,6 +43,11 @@ def one_slot(mesh: Geometry) -> Geometry:
     return Geometry(mesh.positions, mesh.faces, mesh.normals, mesh.uvs)
 
 
+def inside_out(mesh: Geometry) -> Geometry:
+    """The mesh seen from its other side."""
+    return Geometry(mesh.positions, np.ascontiguousarray(mesh.faces[:, ::-1]), -_normals(mesh), mesh.uvs)
+
+
 def sheet(corner: Point, across: Point, up: Point, cells: tuple[int, int]) -> Geometry:
     """A flat grid of (cells + 1)² vertices from `corner` along two sides; its front is across × up."""
     u, v = (np.linspace(0, 1, n + 1) for n in cells)

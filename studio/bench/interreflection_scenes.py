@@ -21,6 +21,7 @@ import numpy as np
 from studio.bench.interreflection_meshes import (
     box,
     bunny,
+    inside_out,
     shell,
     slab,
     star,
@@ -64,7 +65,8 @@ class Setting:
 
     `budget` is the backend's `vertices`; `movable` are nodes that are moved, all of them standing between the
     corners `low` and `high` (x, z) of a floor; `painted` is a material whose shape is edited (`field` of it),
-    `light` one that is dimmed and coloured. `fixed` are the nodes of the room itself.
+    `light` one that is dimmed and coloured. `fixed` are the nodes of the room itself,
+    `tinted` is a material on which other things leave their colour.
     """
 
     name: str
@@ -77,6 +79,7 @@ class Setting:
     field: str
     light: NodeId
     fixed: tuple[NodeId, ...] = ("walls", "floor", "group-room")
+    tinted: str = ""
 
     def count(self) -> int:
         """How many vertices the scene is shaded at."""
@@ -232,6 +235,7 @@ def bleeding() -> Setting:
         "vase",
         "exponent",
         "lamp",
+        tinted="wall",
     )
 
 
@@ -326,10 +330,7 @@ def furnace(albedo: float, curved: bool = False) -> Scene:
     """A closed room of one matte material seen from inside, a bulb in its middle: a box, or a bent egg."""
     wall = _matte("wall", (albedo, albedo, albedo))
     if curved:
-        inside = star(40, 56, lambda d: 1.2 + 0.25 * d[:, 1] + 0.12 * np.sin(3 * d[:, 0]))
-        inside = Geometry(
-            inside.positions, np.ascontiguousarray(inside.faces[:, ::-1]), -np.asarray(inside.normals)
-        )
+        inside = inside_out(star(40, 56, lambda d: 1.2 + 0.25 * d[:, 1] + 0.12 * np.sin(3 * d[:, 0])))
     else:
         inside = box((-1.5, -1.2, -1.0), (1.5, 1.2, 1.0), (15, 12, 10), inward=True)
     bulb = PointLamp(id="bulb", name="Bulb", intensity=1.0)

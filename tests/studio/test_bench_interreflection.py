@@ -16,6 +16,7 @@ from studio.bench import interreflection
 from studio.bench.harness import Report
 from studio.bench.interreflection import Setup, errors_of, measure
 from studio.bench.interreflection_edits import EDITS
+from studio.bench.interreflection_furnace import over_kept_rays
 from studio.bench.interreflection_meshes import box, shell
 from studio.bench.interreflection_operator import Stand, kept_rays, products, source_light
 from studio.bench.interreflection_scenes import Setting, bleeding, furnace, pot_on_floor
@@ -231,6 +232,16 @@ def test_parts_of_the_operator_are_measured(program: Headless) -> None:
     found = figures(report)
     assert found["products_5"] > found["products_15"] > found["products_30"] > 1
     assert all(found[f"error_{tolerance}"] <= tolerance / 100 for tolerance in (5, 15, 30))
+    program.close()
+
+
+@pytest.mark.parametrize("curved", [False, True])
+def test_closed_rooms_of_one_albedo_are_as_bright_as_they_must_be(program: Headless, curved: bool) -> None:
+    settled, partial = over_kept_rays(furnace(0.8, curved), program, 0.8)
+    assert settled < 1e-3
+    assert partial < 1e-5
+    leaky, _ = over_kept_rays(furnace(0.8, curved), program, 0.7)
+    assert leaky == pytest.approx(0.3 / 0.2 - 1, rel=1e-3), "and it is seen where they are not"
     program.close()
 
 
