@@ -1,8 +1,8 @@
 """The part of `lucarne bench interreflection` about closed rooms of one albedo: cases `furnace-ρ`.
 
-Where every place of a closed room sends 1 of its own, all light together is 1/(1 − ρ) everywhere, whatever the
-room's shape; after n bounces of it 1 + ρ + … + ρⁿ⁻¹. A box and a bent egg are looked at over kept rays; a ball
-lit from its middle through the whole pipeline, where direct light is even too.
+Where every place of a closed room sends 1 of its own, all light together is 1/(1 − ρ) everywhere, whatever
+the room's shape; after n bounces of it 1 + ρ + … + ρⁿ⁻¹. A box and a bent egg are looked at over kept rays,
+a ball lit from its middle through the whole pipeline: there direct light is even too.
 """
 
 from __future__ import annotations
