@@ -10,5 +10,10 @@ plugin = Plugin(
     id="interreflection",
     label="Light between surfaces",
     api=API,
-    provides={"indirect": {"gather": "studio_plugins.interreflection.gather.method:METHOD"}},
+    provides={
+        "indirect": {
+            "gather": "studio_plugins.interreflection.gather.method:METHOD",
+            "fields": "studio_plugins.interreflection.fields.method:METHOD",
+        }
+    },
 )
