@@ -138,16 +138,16 @@ class LightBits:
         before, now = self._spheres[moved] - shift, spheres[moved] - shift
         self._todo[np.isin(points.object, moved)] = _ALL
         if len(samples):
+            ends = np.zeros((samples.rows, 4, 64 * self.seen.shape[1]), np.float32)
+            ends[:, :, : len(samples)] = place.transpose(0, 2, 1)
             self._workers.run(
                 len(points),
                 max(64, PAIRS_A_CHUNK // len(samples)),
                 lambda start, stop: mark_moved(
                     points.positions,
                     points.normals,
-                    samples.kind,
                     points.variant,
-                    place,
-                    samples.lamp,
+                    ends,
                     before,
                     now,
                     self.seen,

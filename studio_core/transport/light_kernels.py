@@ -19,6 +19,7 @@ F64 = npt.NDArray[np.float64]
 I8 = npt.NDArray[np.int8]
 I32 = npt.NDArray[np.int32]
 I64 = npt.NDArray[np.int64]
+U8 = npt.NDArray[np.uint8]
 U64 = npt.NDArray[np.uint64]
 
 DISTANT, SPOT, AREA = 0, 2, 3
@@ -163,29 +164,42 @@ def trace_pairs(
 
 
 @kernel
-def _meets(
-    dx: float, dy: float, dz: float, far: float, x: float, y: float, z: float, spheres: F64, s: int
-) -> bool:
-    """Whether the way from (x, y, z) along a unit direction as far as `far` passes sphere s."""
-    cx, cy, cz = spheres[s, 0] - x, spheres[s, 1] - y, spheres[s, 2] - z
-    square = spheres[s, 3] * spheres[s, 3]
-    along = cx * dx + cy * dy + cz * dz
-    apart = cx * cx + cy * cy + cz * cz
-    if apart <= square:
-        return True
-    if along <= 0.0 or apart - along * along > square:
-        return False
-    return bool(along <= far or apart - 2.0 * along * far + far * far <= square)
+def _meet(
+    x: F32, y: F32, z: F32, place: F32, cx: float, cy: float, cz: float, radius: float, out: U8
+) -> None:
+    """Sets out (64,) where the way to a sample passes a sphere at c, by float32 with room for its errors.
+
+    x, y, z are the way to the end, or the direction where `place` is 0. (No branches: this is vector code.)
+    """
+    px, py, pz, square = np.float32(cx), np.float32(cy), np.float32(cz), np.float32(radius * radius)
+    apart = px * px + py * py + pz * pz
+    outside = apart * np.float32(1 - 1e-5) - square
+    for i in range(64):
+        length = x[i] * x[i] + y[i] * y[i] + z[i] * z[i]
+        along = px * x[i] + py * y[i] + pz * z[i]
+        near = along * along >= length * outside
+        end = (along <= length) | (place[i] == 0) | (outside - np.float32(2) * along + length <= 0)
+        out[i] |= (outside <= 0) | ((along > 0) & near & end)
+
+
+@kernel
+def _packed(flags: U8) -> np.uint64:
+    """64 flags, each 0 or 1, as bits."""
+    found = np.uint64(0)
+    for part in range(8):
+        byte = np.uint64(0)
+        for i in range(8):
+            byte |= np.uint64(flags[8 * part + i]) << np.uint64(i)
+        found |= byte << np.uint64(8 * part)
+    return found
 
 
 @kernel
 def mark_moved(
     positions: F32,
     normals: F32,
-    kind: I8,
     variants: I32,
-    place: F64,
-    lamp: F64,
+    ends: F32,
     before: F64,
     now: F64,
     seen: U64,
@@ -195,34 +209,47 @@ def mark_moved(
 ) -> None:
     """Marks pairs of vertices start … stop that something may have freed or hidden.
 
-    before and now (M, 4) are spheres, centre and radius, about what has moved. What was not seen can only
-    have been freed by what was in front of it, what was seen can only be hidden by what is there now.
+    ends (P, 4, 64 W) are places of samples, rows x, y, z and 1 or 0. before and now (M, 4) are spheres,
+    centre and radius, about what has moved. What was not seen can only have been freed by what was in front
+    of it, what was seen can only be hidden by what is there now.
     """
-    columns = len(kind)
+    x, y, z, above = (
+        np.empty(64, np.float32),
+        np.empty(64, np.float32),
+        np.empty(64, np.float32),
+        np.empty(64, np.uint8),
+    )
+    was, becomes = np.empty(64, np.uint8), np.empty(64, np.uint8)
+    moved = len(now)
     for v in range(start, stop):
-        variant = variants[v]
-        x, y, z = float(positions[v, 0]), float(positions[v, 1]), float(positions[v, 2])
-        nx, ny, nz = float(normals[v, 0]), float(normals[v, 1]), float(normals[v, 2])
-        for column in range(columns):
-            word, bit = column >> 6, _ONE << np.uint64(column & 63)
-            if todo[v, word] & bit:
-                continue
-            dx, dy, dz = place[variant, column, 0], place[variant, column, 1], place[variant, column, 2]
-            far = np.inf
-            if kind[column] == DISTANT:
-                if dx * nx + dy * ny + dz * nz <= 0.0:
-                    continue
-            else:
-                dx, dy, dz = dx - x, dy - y, dz - z
-                if dx * nx + dy * ny + dz * nz <= 0.0:
-                    continue
-                far = max(np.sqrt(dx * dx + dy * dy + dz * dz), 1e-6)
-                dx, dy, dz = dx / far, dy / far, dz / far
-            spheres = now if seen[v, word] & bit else before
-            for sphere in range(len(spheres)):
-                if _meets(dx, dy, dz, far, x, y, z, spheres, sphere):
-                    todo[v, word] |= bit
-                    break
+        px, py, pz = positions[v, 0], positions[v, 1], positions[v, 2]
+        nx, ny, nz = normals[v, 0], normals[v, 1], normals[v, 2]
+        row = variants[v]
+        visible = False
+        for m in range(moved):
+            b = nx * (before[m, 0] - px) + ny * (before[m, 1] - py) + nz * (before[m, 2] - pz)
+            n = nx * (now[m, 0] - px) + ny * (now[m, 1] - py) + nz * (now[m, 2] - pz)
+            visible |= b > -before[m, 3] or n > -now[m, 3]
+        if not visible:  # all of it below the horizon
+            continue
+        for word in range(seen.shape[1]):
+            first = word * 64
+            place = ends[row, 3, first : first + 64]
+            for i in range(64):
+                one = place[i]
+                x[i] = ends[row, 0, first + i] - one * px
+                y[i] = ends[row, 1, first + i] - one * py
+                z[i] = ends[row, 2, first + i] - one * pz
+                above[i] = x[i] * nx + y[i] * ny + z[i] * nz > 0
+                was[i] = 0
+                becomes[i] = 0
+            for m in range(moved):
+                _meet(
+                    x, y, z, place, before[m, 0] - px, before[m, 1] - py, before[m, 2] - pz, before[m, 3], was
+                )
+                _meet(x, y, z, place, now[m, 0] - px, now[m, 1] - py, now[m, 2] - pz, now[m, 3], becomes)
+            own = seen[v, word]
+            todo[v, word] |= _packed(above) & ((own & _packed(becomes)) | (~own & _packed(was)))
 
 
 @kernel
