@@ -30,7 +30,7 @@ U64 = npt.NDArray[np.uint64]
 
 PAIRS_A_CHUNK = 1 << 15
 _ALL = ~np.uint64(0)
-_MARGIN = 1e-5  # of a sphere's radius
+_MARGIN = 1e-4  # of what is about an object
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,6 +63,34 @@ class LitPoints:
         return len(self.positions)
 
 
+@dataclass(frozen=True, eq=False)
+class Bounds:
+    """Spheres (n, 4) about objects in the world, and boxes (n, 3, 4) that lead to where each is ±1."""
+
+    spheres: F64
+    boxes: F64
+
+    @staticmethod
+    def of(caster: RayCaster) -> Bounds:
+        """Where a caster's objects are now; a box that nothing meets where there is nothing to meet."""
+        spheres, boxes = np.zeros((len(caster), 4)), np.zeros((len(caster), 3, 4))
+        for index in range(len(caster)):
+            part = caster.part(index)
+            spheres[index] = *part.centre, part.radius * (1 + _MARGIN)
+            if part.scene:
+                half = part.half + _MARGIN * part.half.sum() + caster.epsilon * part.scale
+                boxes[index] = part.from_world / half[:, None]
+            else:
+                boxes[index, :, 3] = 1e9
+        return Bounds(spheres, boxes)
+
+    def boxes_about(self, origin: F64) -> F64:
+        """The boxes, for points relative to an origin."""
+        made = self.boxes.copy()
+        made[:, :, 3] += made[:, :, :3] @ origin
+        return made
+
+
 class LightBits:
     """Bits (V, W) of points and columns of samples; `seen` is right after every `update` that returns.
 
@@ -73,7 +101,7 @@ class LightBits:
         self._workers = workers
         self._caster: RayCaster | None = None
         self._transforms: tuple[Transform, ...] = ()
-        self._spheres = np.zeros((0, 4))
+        self._bounds = Bounds(np.zeros((0, 4)), np.zeros((0, 3, 4)))
         self._keys: tuple[tuple[object, int], ...] = ()
         self._rows = 0
         self._order = np.zeros(0, np.int32)
@@ -101,7 +129,7 @@ class LightBits:
             self._caster, self._rows, self._keys = caster, samples.rows, samples.keys
             self._order = _order(points)
             self._transforms = casters.transforms
-            self._spheres = _spheres(caster)
+            self._bounds = Bounds.of(caster)
         else:
             self._follow_samples(samples)
             self._follow_objects(points, casters, samples, relative)
@@ -134,8 +162,9 @@ class LightBits:
         if not moved:
             return
         shift = np.append(points.origin, 0.0)
-        spheres = _spheres(casters.primary)
-        before, now = self._spheres[moved] - shift, spheres[moved] - shift
+        bounds = Bounds.of(casters.primary)
+        before, now = (b.spheres[moved] - shift for b in (self._bounds, bounds))
+        boxes = [b.boxes_about(points.origin)[moved] for b in (self._bounds, bounds)]
         self._todo[np.isin(points.object, moved)] = _ALL
         if len(samples):
             ends = np.zeros((samples.rows, 4, 64 * self.seen.shape[1]), np.float32)
@@ -150,13 +179,15 @@ class LightBits:
                     ends,
                     before,
                     now,
+                    boxes[0],
+                    boxes[1],
                     self.seen,
                     self._todo,
                     start,
                     stop,
                 ),
             )
-        self._transforms, self._spheres = casters.transforms, spheres
+        self._transforms, self._bounds = casters.transforms, bounds
 
     def _trace(
         self, points: LitPoints, samples: LightSamples, place: F64, job: Checkpoints | None
@@ -203,10 +234,3 @@ def _order(points: LitPoints) -> I32:
         return np.zeros(0, np.int32)
     facing = (points.normals > 0) @ np.array([1, 2, 4])
     return np.lexsort((morton_codes(points.positions.astype(np.float64)), facing)).astype(np.int32)
-
-
-def _spheres(caster: RayCaster) -> F64:
-    """(n, 4) spheres about objects in the world."""
-    parts = [caster.part(index) for index in range(len(caster))]
-    made = np.array([[*part.centre, part.radius * (1 + _MARGIN)] for part in parts], np.float64)
-    return made.reshape(-1, 4)

@@ -164,22 +164,32 @@ def trace_pairs(
 
 
 @kernel
-def _meet(
-    x: F32, y: F32, z: F32, place: F32, cx: float, cy: float, cz: float, radius: float, out: U8
-) -> None:
-    """Sets out (64,) where the way to a sample passes a sphere at c, by float32 with room for its errors.
+def _meet(x: F32, y: F32, z: F32, place: F32, px: float, py: float, pz: float, box: F64, out: U8) -> None:
+    """Sets out (64,) where the way from p to a sample passes a box.
 
-    x, y, z are the way to the end, or the direction where `place` is 0. (No branches: this is vector code.)
+    `box` (3, 4) leads to a frame in which it reaches from −1 to 1. x, y, z are the way to the end, or the
+    direction where `place` is 0. (No branches: this is vector code.)
     """
-    px, py, pz, square = np.float32(cx), np.float32(cy), np.float32(cz), np.float32(radius * radius)
-    apart = px * px + py * py + pz * pz
-    outside = apart * np.float32(1 - 1e-5) - square
+    ox = np.float32(box[0, 0] * px + box[0, 1] * py + box[0, 2] * pz + box[0, 3])
+    oy = np.float32(box[1, 0] * px + box[1, 1] * py + box[1, 2] * pz + box[1, 3])
+    oz = np.float32(box[2, 0] * px + box[2, 1] * py + box[2, 2] * pz + box[2, 3])
+    xx, xy, xz = np.float32(box[0, 0]), np.float32(box[0, 1]), np.float32(box[0, 2])
+    yx, yy, yz = np.float32(box[1, 0]), np.float32(box[1, 1]), np.float32(box[1, 2])
+    zx, zy, zz = np.float32(box[2, 0]), np.float32(box[2, 1]), np.float32(box[2, 2])
+    one, small = np.float32(1), np.float32(1e-12)
     for i in range(64):
-        length = x[i] * x[i] + y[i] * y[i] + z[i] * z[i]
-        along = px * x[i] + py * y[i] + pz * z[i]
-        near = along * along >= length * outside
-        end = (along <= length) | (place[i] == 0) | (outside - np.float32(2) * along + length <= 0)
-        out[i] |= (outside <= 0) | ((along > 0) & near & end)
+        dx = xx * x[i] + xy * y[i] + xz * z[i]
+        dy = yx * x[i] + yy * y[i] + yz * z[i]
+        dz = zx * x[i] + zy * y[i] + zz * z[i]
+        ix = one / (dx if abs(dx) > small else small)
+        iy = one / (dy if abs(dy) > small else small)
+        iz = one / (dz if abs(dz) > small else small)
+        ax, bx = (-one - ox) * ix, (one - ox) * ix
+        ay, by = (-one - oy) * iy, (one - oy) * iy
+        az, bz = (-one - oz) * iz, (one - oz) * iz
+        enters = max(max(min(ax, bx), min(ay, by)), max(min(az, bz), np.float32(0)))
+        leaves = min(min(max(ax, bx), max(ay, by)), max(az, bz))
+        out[i] |= (enters <= leaves) & ((enters <= one) | (place[i] == 0))
 
 
 @kernel
@@ -202,6 +212,8 @@ def mark_moved(
     ends: F32,
     before: F64,
     now: F64,
+    boxes_before: F64,
+    boxes_now: F64,
     seen: U64,
     todo: U64,
     start: int,
@@ -210,8 +222,8 @@ def mark_moved(
     """Marks pairs of vertices start … stop that something may have freed or hidden.
 
     ends (P, 4, 64 W) are places of samples, rows x, y, z and 1 or 0. before and now (M, 4) are spheres,
-    centre and radius, about what has moved. What was not seen can only have been freed by what was in front
-    of it, what was seen can only be hidden by what is there now.
+    centre and radius, about what has moved, and boxes (M, 3, 4) as in `_meet`. What was not seen can only
+    have been freed by what was in front of it, what was seen can only be hidden by what is there now.
     """
     x, y, z, above = (
         np.empty(64, np.float32),
@@ -244,10 +256,8 @@ def mark_moved(
                 was[i] = 0
                 becomes[i] = 0
             for m in range(moved):
-                _meet(
-                    x, y, z, place, before[m, 0] - px, before[m, 1] - py, before[m, 2] - pz, before[m, 3], was
-                )
-                _meet(x, y, z, place, now[m, 0] - px, now[m, 1] - py, now[m, 2] - pz, now[m, 3], becomes)
+                _meet(x, y, z, place, px, py, pz, boxes_before[m], was)
+                _meet(x, y, z, place, px, py, pz, boxes_now[m], becomes)
             own = seen[v, word]
             todo[v, word] |= _packed(above) & ((own & _packed(becomes)) | (~own & _packed(was)))
 
