@@ -14,9 +14,10 @@ from typing import Any, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
+from studio_core.kernels.raycast import CasterHandles
 from studio_core.parallel import Checkpoints, Workers
 from studio_core.scene.nodes import NodeId
-from studio_core.scene.shading_mesh import ShadingMesh
+from studio_core.scene.shading_mesh import NO_BACK, ShadingMesh
 from studio_core.scene.transform import Transform
 from studio_core.scene.world_mesh import WorldMesh
 from studio_core.shading.artifacts import Casters
@@ -26,6 +27,7 @@ from studio_core.transport.trace_rows import ASKED, COUNTS, TRACED, update_rows
 F32 = npt.NDArray[np.float32]
 I32 = npt.NDArray[np.int32]
 I64 = npt.NDArray[np.int64]
+U32 = npt.NDArray[np.uint32]
 Bools = npt.NDArray[np.bool_]
 Poses: TypeAlias = tuple[Transform | None, ...]
 Shape: TypeAlias = tuple[NodeId, ShadingMesh, object]
@@ -68,6 +70,7 @@ class Rows:
         self._poses: dict[int, Poses] = {}
         self._now = NEVER
         self._ended = True
+        self._corners: tuple[I32, U32] | None = None
         self._clear(0)
 
     def _clear(self, vertices: int) -> None:
@@ -224,6 +227,18 @@ class Rows:
         both = zip(self.table.arrays, more.arrays, strict=True)
         self.table = HitTable(*(np.concatenate(pair) for pair in both))
 
+    def _corners_of(self, mesh: WorldMesh, handles: CasterHandles) -> U32:
+        """(slots, 6): vertices of opaque faces, within their object, in the caster's order; kept with it."""
+        if self._corners is None or self._corners[0] is not handles.face_ids:
+            made = np.full((len(handles.face_ids), 6), NO_BACK, np.uint32)
+            for placed, (start, stop) in zip(mesh.objects, handles.face_start.tolist(), strict=True):
+                if start < stop:
+                    ids = handles.face_ids[start:stop]
+                    made[start:stop, :3] = placed.mesh.faces[ids]
+                    made[start:stop, 3:] = placed.mesh.back_faces[ids]
+            self._corners = handles.face_ids, made
+        return self._corners[1]
+
     # -- tracing -----------------------------------------------------------------------------------
 
     def _begin(self) -> None:
@@ -261,14 +276,16 @@ class Rows:
         chunk = max(8, RAYS_A_CHUNK // self._rays)
         counts = np.zeros((-(-len(todo) // chunk), COUNTS), np.int64)
         table = self.table
+        frames = np.zeros((len(mesh), 8), np.float32)
+        frames[:, :3], frames[:, 3:7] = mesh.normals, mesh.tangents
 
         asked: tuple[Any, ...] = (
             *(todo, state, moved_start, moved_items, whole, local),
             *(self.rows, self.variant, self._stream, directions),
-            *(mesh.positions, mesh.normals, mesh.tangents, mesh.geometric, mesh.inset),
-            *(mesh.object, mesh.face_offsets, mesh.faces, mesh.back_faces, shift, handles.epsilon),
+            *(mesh.positions, frames, mesh.geometric, mesh.inset),
+            *(mesh.object, mesh.vertex_offsets, shift, handles.epsilon),
             *(handles.intersect8, handles.occluded8, handles.scene),
-            *(handles.face_start, handles.face_ids, handles.normals),
+            *(handles.face_start, self._corners_of(mesh, handles), handles.normals),
             *(part_scene, from_mesh, centre, radius),
             *(table.vertex, table.cell, table.distance.view(np.uint16)),
             *(self._seen, self._holes, self.black, self.touched),

@@ -48,51 +48,59 @@ def settle(
     valid: I32,
     stream: I64,
     face_start: I64,
-    face_ids: I32,
+    corners: U32,
     turns: F32,
-    face_offsets: I64,
-    faces: U32,
-    back_faces: U32,
-    normals: F32,
-    tangents: F32,
+    vertex_offsets: I64,
+    frames: F32,
     word: U32,
+    met: I64,
     vertex: U32,
     cell: U16,
     distance: U16,
     touched: npt.NDArray[np.bool_],
 ) -> None:
-    """Writes what the rays of a packet met."""
+    """Writes what the rays of a packet met; `met` (8,) is scratch.
+
+    corners (slots, 6): the front and the back vertices of each face in the order of the caster, counted
+    within their object; frames (V, 8): normal and tangent of each vertex.
+    """
     words = packet.view(np.uint32)
-    for lane in range(used):
-        row, ray = row_of[lane], ray_of[lane]
-        met, seen, far = np.int64(NOTHING), 0, _far()
+    for lane in range(used):  # in two loops, so that reads of one lane do not wait for those of another
+        met[lane] = NOTHING
         if valid[lane] != 0 and words[GEOMETRY, lane] != NO_HIT:
             thing = np.int64(words[INSTANCE, lane])
             slot = face_start[thing, np.int64(words[GEOMETRY, lane])] + np.int64(words[PRIMITIVE, lane])
-            face = face_offsets[thing] + face_ids[slot]
             dx, dy, dz = along[lane, 0], along[lane, 1], along[lane, 2]
             m = turns[thing]
             # the sign of the world's normal along the ray: Ng · (Mᵀ d)
             facing = np.float64(packet[NORMAL, lane]) * (m[0, 0] * dx + m[1, 0] * dy + m[2, 0] * dz)
             facing += np.float64(packet[NORMAL + 1, lane]) * (m[0, 1] * dx + m[1, 1] * dy + m[2, 1] * dz)
             facing += np.float64(packet[NORMAL + 2, lane]) * (m[0, 2] * dx + m[1, 2] * dy + m[2, 2] * dz)
+            number = chance(stream[row_of[lane]], ray_of[lane])
             u, v = packet[U, lane], packet[V, lane]
-            number = chance(stream[row], ray)
-            corner = 1 if number < u else (2 if number < u + v else 0)
-            met = np.int64(faces[face, corner] if facing < 0 else back_faces[face, corner])
+            corner = (
+                np.int64(number < u + v) + np.int64(number < v) + (np.int64(0) if facing < 0 else np.int64(3))
+            )
+            found = np.int64(corners[slot, corner])
+            met[lane] = found + vertex_offsets[thing] if found != NO_BACK else np.int64(BLACK)
+    for lane in range(used):
+        row, ray = row_of[lane], ray_of[lane]
+        found, seen, far = met[lane], 0, _far()
+        if found != NOTHING:
             far = packet[TFAR, lane]
-            if met == NO_BACK:
-                met, seen = np.int64(BLACK), int(thing) if thing < NO_OBJECT else NO_OBJECT
+            if found == BLACK:
+                thing = np.int64(words[INSTANCE, lane])
+                seen = int(thing) if thing < NO_OBJECT else NO_OBJECT
             else:
-                nx, ny, nz = normals[met, 0], normals[met, 1], normals[met, 2]
-                tx, ty, tz = tangents[met, 0], tangents[met, 1], tangents[met, 2]
-                sense = -tangents[met, 3]
+                dx, dy, dz = along[lane, 0], along[lane, 1], along[lane, 2]
+                f = frames[found]
+                nx, ny, nz, tx, ty, tz = f[0], f[1], f[2], f[3], f[4], f[5]
                 seen = cell_of(
                     -(tx * dx + ty * dy + tz * dz),
-                    sense * ((ny * tz - nz * ty) * dx + (nz * tx - nx * tz) * dy + (nx * ty - ny * tx) * dz),
+                    -f[6] * ((ny * tz - nz * ty) * dx + (nz * tx - nx * tz) * dy + (nx * ty - ny * tx) * dz),
                     -(nx * dx + ny * dy + nz * dz),
                 )
-        if vertex[row, ray] != met or cell[row, ray] != seen:
+        if vertex[row, ray] != found or cell[row, ray] != seen:
             touched[row] = True
-            vertex[row, ray], cell[row, ray] = met, seen
+            vertex[row, ray], cell[row, ray] = found, seen
         distance[row, ray] = half_bits(far, word)

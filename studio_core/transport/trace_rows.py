@@ -44,8 +44,7 @@ def _prepare(
     local: bool,
     vertex: I64,
     positions: F32,
-    normals: F32,
-    tangents: F32,
+    frames: F32,
     geometric: F32,
     inset: F32,
     epsilon: float,
@@ -55,7 +54,7 @@ def _prepare(
     """Frame and start of a row's rays, relative to the mesh's origin; whether they are numbers."""
     v = vertex[row]
     if local:
-        surface_frame(normals[v], tangents[v], axes)
+        surface_frame(frames[v, 0:3], frames[v, 3:7], axes)
     else:
         axes[:] = 0.0
         axes[0, 0] = axes[1, 1] = axes[2, 2] = 1.0
@@ -80,13 +79,10 @@ def _follow(
     variant: I32,
     directions: F32,
     face_start: I64,
-    face_ids: I32,
+    corners: U32,
     turns: F32,
-    face_offsets: I64,
-    faces: U32,
-    back_faces: U32,
-    normals: F32,
-    tangents: F32,
+    vertex_offsets: I64,
+    frames: F32,
     packet: F32,
     valid: I32,
     word: U32,
@@ -98,7 +94,7 @@ def _follow(
 ) -> int:
     """Traces the marked rays and writes what they meet; how many."""
     rays = directions.shape[1]
-    row_of, ray_of = np.empty(8, np.int64), np.empty(8, np.int64)
+    row_of, ray_of, met = np.empty(8, np.int64), np.empty(8, np.int64), np.empty(8, np.int64)
     along = np.empty((8, 3))
     used, traced = 0, 0
     for column in range(count + 1):
@@ -135,14 +131,12 @@ def _follow(
                     valid,
                     stream,
                     face_start,
-                    face_ids,
+                    corners,
                     turns,
-                    face_offsets,
-                    faces,
-                    back_faces,
-                    normals,
-                    tangents,
+                    vertex_offsets,
+                    frames,
                     word,
+                    met,
                     vertex,
                     cell,
                     distance,
@@ -167,21 +161,18 @@ def update_rows(
     stream: I64,
     directions: F32,
     positions: F32,
-    normals: F32,
-    tangents: F32,
+    frames: F32,
     geometric: F32,
     inset: F32,
     thing_of: I32,
-    face_offsets: I64,
-    faces: U32,
-    back_faces: U32,
+    vertex_offsets: I64,
     shift: F64,
     epsilon: float,
     intersect8: int,
     occluded8: int,
     scene: int,
     face_start: I64,
-    face_ids: I32,
+    corners: U32,
     turns: F32,
     part_scene: I64,
     from_mesh: F64,
@@ -201,7 +192,8 @@ def update_rows(
     state[i] says what which[i] was last traced in: `whole` is everything to be traced, else the objects
     moved_items[moved_start[state]:moved_start[state + 1]] stood elsewhere.
     directions (P, N, 3) are in the receivers' frames if `local`, else in the world; variant and stream (R,)
-    are the pattern and the chance of a row, receiver (R,) its vertex.
+    are the pattern and the chance of a row, receiver (R,) its vertex. frames (V, 8) and corners (slots, 6)
+    are as in `settle`.
     part_scene, from_mesh (n, 3, 4), centre (n, 3) relative to the mesh's origin and radius are the objects
     alone; shift leads from the mesh's origin to the caster's centre.
     Of `holes` (R,) the rays that met what is GONE are traced too. things_seen (R,) gets a bit for each object
@@ -227,8 +219,7 @@ def update_rows(
             local,
             receiver,
             positions,
-            normals,
-            tangents,
+            frames,
             geometric,
             inset,
             epsilon,
@@ -325,13 +316,10 @@ def update_rows(
         variant,
         directions,
         face_start,
-        face_ids,
+        corners,
         turns,
-        face_offsets,
-        faces,
-        back_faces,
-        normals,
-        tangents,
+        vertex_offsets,
+        frames,
         packet,
         valid,
         word,
