@@ -74,22 +74,22 @@ class HitTable:
 
 
 @kernel
-def half_bits(value: np.float32, word: U32) -> np.int64:
-    """The float16 next to a number ≥ 0, as bits; `word` (1,) is scratch."""
+def half_bits(value: np.float32, word: U32, number: F32) -> np.int64:
+    """The float16 next to a number ≥ 0, as bits; `word` (1,) is scratch, and `number` the same as a float."""
     if not value < 65520.0:
         return np.int64(_INFINITE)
-    word.view(np.float32)[0] = value * _SMALLER
+    number[0] = value * _SMALLER
     whole = np.int64(word[0])
     return np.int64((whole + 0xFFF + ((whole >> 13) & 1)) >> 13)
 
 
 @kernel
-def half_value(bits: int, word: U32) -> np.float32:
-    """The number ≥ 0 that float16 bits mean; `word` (1,) is scratch."""
+def half_value(bits: int, word: U32, number: F32) -> np.float32:
+    """The number ≥ 0 that float16 bits mean; scratch as in `half_bits`."""
     if bits >= _INFINITE:
         return np.float32(np.inf)
     word[0] = np.uint32(bits << 13)
-    return np.float32(word.view(np.float32)[0] * _LARGER)
+    return np.float32(number[0] * _LARGER)
 
 
 @kernel

@@ -1,7 +1,8 @@
 """Which rays a moved object may now stand in the way of.
 
 First by reckoning, inside its bounding sphere, then by tracing against the object alone, in its own frame, no
-farther than the ray reached before.
+farther than the ray reached before. Kernels here index whole arrays: a view would be counted, by all threads
+in one place.
 """
 
 from __future__ import annotations
@@ -29,37 +30,43 @@ _ROOM = np.float32(1.001)
 
 @kernel
 def ask(
+    row: int,
+    column: int,
     local: bool,
+    thing: int,
     centre: F64,
-    radius: float,
+    radius: F64,
     epsilon: float,
     axes: F64,
     origin: F64,
+    variant: I32,
     directions: F32,
     distance: U16,
     word: U32,
+    number: F32,
     marks: U8,
 ) -> int:
-    """Marks the rays (N,) of a row that pass a sphere before they end; how many."""
-    wx, wy, wz = centre[0] - origin[0], centre[1] - origin[1], centre[2] - origin[2]
-    x = np.float32(axes[0, 0] * wx + axes[0, 1] * wy + axes[0, 2] * wz)
-    y = np.float32(axes[1, 0] * wx + axes[1, 1] * wy + axes[1, 2] * wz)
-    z = np.float32(axes[2, 0] * wx + axes[2, 1] * wy + axes[2, 2] * wz)
-    if local and z + radius <= 0.0:  # below the horizon
+    """Marks the rays of a row that pass an object's sphere before they end; how many."""
+    wx = centre[thing, 0] - origin[column, 0]
+    wy = centre[thing, 1] - origin[column, 1]
+    wz = centre[thing, 2] - origin[column, 2]
+    x = np.float32(axes[column, 0, 0] * wx + axes[column, 0, 1] * wy + axes[column, 0, 2] * wz)
+    y = np.float32(axes[column, 1, 0] * wx + axes[column, 1, 1] * wy + axes[column, 1, 2] * wz)
+    z = np.float32(axes[column, 2, 0] * wx + axes[column, 2, 1] * wy + axes[column, 2, 2] * wz)
+    if local and z + radius[thing] <= 0.0:  # below the horizon
         return 0
-    outside = np.float32(wx * wx + wy * wy + wz * wz - radius * radius)
+    outside = np.float32(wx * wx + wy * wy + wz * wz - radius[thing] * radius[thing])
     found = 0
-    for ray in range(len(directions)):
-        if marks[ray] != KEEP:
-            continue
-        along = directions[ray, 0] * x + directions[ray, 1] * y + directions[ray, 2] * z
+    p = variant[row]
+    for ray in range(directions.shape[1]):
+        along = directions[p, ray, 0] * x + directions[p, ray, 1] * y + directions[p, ray, 2] * z
         depth = along * along - outside
-        if outside > 0 and (depth < 0 or along < 0):
+        if (outside > 0 and (depth < 0 or along < 0)) or marks[column, ray] != KEEP:
             continue
-        reach = half_value(distance[ray], word) * _ROOM + np.float32(epsilon)
+        reach = half_value(distance[row, ray], word, number) * _ROOM + np.float32(epsilon)
         if outside > 0 and along > reach and (along - reach) * (along - reach) > depth:
             continue
-        marks[ray] = ASK
+        marks[column, ray] = ASK
         found += 1
     return found
 
@@ -68,6 +75,7 @@ def ask(
 def answer(
     occluded8: int,
     scene: int,
+    thing: int,
     from_mesh: F64,
     first: int,
     count: int,
@@ -81,17 +89,13 @@ def answer(
     packet: F32,
     valid: I32,
     word: U32,
+    number: F32,
     marks: U8,
 ) -> None:
     """Traces the rays in question against one object: those that it stops are to be traced."""
     rays = directions.shape[1]
     column_of, ray_of = np.empty(8, np.int64), np.empty(8, np.int64)
-    starts = np.empty((count, 3))
-    for column in range(count):
-        for axis in range(3):
-            m = from_mesh[axis]
-            o = origin[column]
-            starts[column, axis] = m[0] * o[0] + m[1] * o[1] + m[2] * o[2] + m[3]
+    m = from_mesh[thing].copy()
     used = 0
     for column in range(count + 1):
         last = column == count
@@ -100,16 +104,20 @@ def answer(
                 if marks[column, ray] != ASK:
                     continue
                 row = which[first + column]
-                d = directions[variant[row], ray]
-                t = axes[column]
-                dx = t[0, 0] * d[0] + t[1, 0] * d[1] + t[2, 0] * d[2]
-                dy = t[0, 1] * d[0] + t[1, 1] * d[1] + t[2, 1] * d[2]
-                dz = t[0, 2] * d[0] + t[1, 2] * d[1] + t[2, 2] * d[2]
+                p = variant[row]
+                x, y, z = directions[p, ray, 0], directions[p, ray, 1], directions[p, ray, 2]
+                dx = axes[column, 0, 0] * x + axes[column, 1, 0] * y + axes[column, 2, 0] * z
+                dy = axes[column, 0, 1] * x + axes[column, 1, 1] * y + axes[column, 2, 1] * z
+                dz = axes[column, 0, 2] * x + axes[column, 1, 2] * y + axes[column, 2, 2] * z
+                ox, oy, oz = origin[column, 0], origin[column, 1], origin[column, 2]
                 for axis in range(3):
-                    m = from_mesh[axis]
-                    packet[ORIGIN + axis, used] = starts[column, axis]
-                    packet[DIRECTION + axis, used] = m[0] * dx + m[1] * dy + m[2] * dz
-                packet[TFAR, used] = half_value(distance[row, ray], word) * _ROOM + np.float32(epsilon)
+                    packet[ORIGIN + axis, used] = (
+                        m[axis, 0] * ox + m[axis, 1] * oy + m[axis, 2] * oz + m[axis, 3]
+                    )
+                    packet[DIRECTION + axis, used] = m[axis, 0] * dx + m[axis, 1] * dy + m[axis, 2] * dz
+                packet[TFAR, used] = half_value(distance[row, ray], word, number) * _ROOM + np.float32(
+                    epsilon
+                )
                 valid[used] = -1
                 column_of[used], ray_of[used] = column, ray
                 used += 1

@@ -45,6 +45,7 @@ def settle(
     ray_of: I64,
     along: F64,
     packet: F32,
+    words: U32,
     valid: I32,
     stream: I64,
     face_start: I64,
@@ -53,6 +54,7 @@ def settle(
     vertex_offsets: I64,
     frames: F32,
     word: U32,
+    number: F32,
     met: I64,
     vertex: U32,
     cell: U16,
@@ -64,22 +66,20 @@ def settle(
     corners (slots, 6): the front and the back vertices of each face in the order of the caster, counted
     within their object; frames (V, 8): normal and tangent of each vertex.
     """
-    words = packet.view(np.uint32)
     for lane in range(used):  # in two loops, so that reads of one lane do not wait for those of another
         met[lane] = NOTHING
         if valid[lane] != 0 and words[GEOMETRY, lane] != NO_HIT:
             thing = np.int64(words[INSTANCE, lane])
             slot = face_start[thing, np.int64(words[GEOMETRY, lane])] + np.int64(words[PRIMITIVE, lane])
             dx, dy, dz = along[lane, 0], along[lane, 1], along[lane, 2]
-            m = turns[thing]
-            # the sign of the world's normal along the ray: Ng · (Mᵀ d)
-            facing = np.float64(packet[NORMAL, lane]) * (m[0, 0] * dx + m[1, 0] * dy + m[2, 0] * dz)
-            facing += np.float64(packet[NORMAL + 1, lane]) * (m[0, 1] * dx + m[1, 1] * dy + m[2, 1] * dz)
-            facing += np.float64(packet[NORMAL + 2, lane]) * (m[0, 2] * dx + m[1, 2] * dy + m[2, 2] * dz)
-            number = chance(stream[row_of[lane]], ray_of[lane])
+            facing = 0.0  # the sign of the world's normal along the ray: Ng · (Mᵀ d)
+            for axis in range(3):
+                turned = turns[thing, 0, axis] * dx + turns[thing, 1, axis] * dy + turns[thing, 2, axis] * dz
+                facing += np.float64(packet[NORMAL + axis, lane]) * turned
+            drawn = chance(stream[row_of[lane]], ray_of[lane])
             u, v = packet[U, lane], packet[V, lane]
             corner = (
-                np.int64(number < u + v) + np.int64(number < v) + (np.int64(0) if facing < 0 else np.int64(3))
+                np.int64(drawn < u + v) + np.int64(drawn < v) + (np.int64(0) if facing < 0 else np.int64(3))
             )
             found = np.int64(corners[slot, corner])
             met[lane] = found + vertex_offsets[thing] if found != NO_BACK else np.int64(BLACK)
@@ -93,14 +93,15 @@ def settle(
                 seen = int(thing) if thing < NO_OBJECT else NO_OBJECT
             else:
                 dx, dy, dz = along[lane, 0], along[lane, 1], along[lane, 2]
-                f = frames[found]
-                nx, ny, nz, tx, ty, tz = f[0], f[1], f[2], f[3], f[4], f[5]
+                nx, ny, nz = frames[found, 0], frames[found, 1], frames[found, 2]
+                tx, ty, tz = frames[found, 3], frames[found, 4], frames[found, 5]
+                sense = -frames[found, 6]
                 seen = cell_of(
                     -(tx * dx + ty * dy + tz * dz),
-                    -f[6] * ((ny * tz - nz * ty) * dx + (nz * tx - nx * tz) * dy + (nx * ty - ny * tx) * dz),
+                    sense * ((ny * tz - nz * ty) * dx + (nz * tx - nx * tz) * dy + (nx * ty - ny * tx) * dz),
                     -(nx * dx + ny * dy + nz * dz),
                 )
         if vertex[row, ray] != found or cell[row, ray] != seen:
             touched[row] = True
             vertex[row, ray], cell[row, ray] = found, seen
-        distance[row, ray] = half_bits(far, word)
+        distance[row, ray] = half_bits(far, word, number)

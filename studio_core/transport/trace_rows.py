@@ -40,28 +40,34 @@ TRACED, ASKED = range(COUNTS)
 
 @kernel
 def _prepare(
-    row: int,
+    v: int,
+    column: int,
     local: bool,
-    vertex: I64,
     positions: F32,
     frames: F32,
     geometric: F32,
     inset: F32,
     epsilon: float,
+    scratch: tuple[F32, F32, F64],
     axes: F64,
     origin: F64,
 ) -> bool:
-    """Frame and start of a row's rays, relative to the mesh's origin; whether they are numbers."""
-    v = vertex[row]
+    """Frame and start of a vertex' rays, relative to the mesh's origin; whether they are numbers."""
+    normal, tangent, turned = scratch
     if local:
-        surface_frame(frames[v, 0:3], frames[v, 3:7], axes)
-    else:
-        axes[:] = 0.0
-        axes[0, 0] = axes[1, 1] = axes[2, 2] = 1.0
+        for k in range(3):
+            normal[k] = frames[v, k]
+        for k in range(4):
+            tangent[k] = frames[v, 3 + k]
+        surface_frame(normal, tangent, turned)
     size = 0.0
-    for axis in range(3):
-        origin[axis] = float(positions[v, axis]) + epsilon * float(geometric[v, axis]) + float(inset[v, axis])
-        size += abs(origin[axis]) + abs(axes[0, axis]) + abs(axes[1, axis]) + abs(axes[2, axis])
+    for k in range(3):
+        for axis in range(3):
+            axes[column, k, axis] = turned[k, axis] if local else (1.0 if k == axis else 0.0)
+            size += abs(axes[column, k, axis])
+        at = float(positions[v, k]) + epsilon * float(geometric[v, k]) + float(inset[v, k])
+        origin[column, k] = at
+        size += abs(at)
     return bool(size < np.inf)
 
 
@@ -84,8 +90,10 @@ def _follow(
     vertex_offsets: I64,
     frames: F32,
     packet: F32,
+    words: U32,
     valid: I32,
     word: U32,
+    number: F32,
     marks: U8,
     vertex: U32,
     cell: U16,
@@ -104,11 +112,13 @@ def _follow(
                 if marks[column, ray] != TRACE:
                     continue
                 row = which[first + column]
-                d = directions[variant[row], ray]
-                t = axes[column]
+                p = variant[row]
+                x, y, z = directions[p, ray, 0], directions[p, ray, 1], directions[p, ray, 2]
                 size = 0.0
                 for axis in range(3):
-                    along[used, axis] = t[0, axis] * d[0] + t[1, axis] * d[1] + t[2, axis] * d[2]
+                    along[used, axis] = (
+                        axes[column, 0, axis] * x + axes[column, 1, axis] * y + axes[column, 2, axis] * z
+                    )
                     size += abs(along[used, axis])
                     packet[ORIGIN + axis, used] = origin[column, axis] + shift[axis]
                     packet[DIRECTION + axis, used] = along[used, axis]
@@ -128,6 +138,7 @@ def _follow(
                     ray_of,
                     along,
                     packet,
+                    words,
                     valid,
                     stream,
                     face_start,
@@ -136,6 +147,7 @@ def _follow(
                     vertex_offsets,
                     frames,
                     word,
+                    number,
                     met,
                     vertex,
                     cell,
@@ -203,8 +215,11 @@ def update_rows(
     count = stop - start
     rays = directions.shape[1]
     packet, valid = new_packet()
-    packet.view(np.uint32)[MASK, :] = OPAQUE
+    words = packet.view(np.uint32)
+    words[MASK, :] = OPAQUE
     word = np.zeros(1, np.uint32)
+    number = word.view(np.float32)
+    scratch = (np.empty(3, np.float32), np.empty(4, np.float32), np.empty((3, 3)))
     marks = np.zeros((count, rays), np.uint8)
     axes, origin = np.empty((count, 3, 3)), np.empty((count, 3))
     good = np.empty(count, np.bool_)
@@ -215,16 +230,7 @@ def update_rows(
     for column in range(count):
         row = which[start + column]
         good[column] = _prepare(
-            row,
-            local,
-            receiver,
-            positions,
-            frames,
-            geometric,
-            inset,
-            epsilon,
-            axes[column],
-            origin[column],
+            receiver[row], column, local, positions, frames, geometric, inset, epsilon, scratch, axes, origin
         )
         s = state[start + column]
         if s != before:  # what moved since
@@ -240,11 +246,11 @@ def update_rows(
                 vertex[row, ray], cell[row, ray], distance[row, ray] = (
                     NOTHING,
                     0,
-                    half_bits(np.float32(np.inf), word),
+                    half_bits(np.float32(np.inf), word, number),
                 )
             continue
         if whole[s] or moved_here[thing_of[receiver[row]]]:
-            marks[column] = TRACE
+            marks[column, :] = TRACE
             marked[column] = True
         elif holes[row] or things_seen[row] & bits != np.uint64(0):
             for ray in range(rays):
@@ -269,16 +275,21 @@ def update_rows(
             for k in range(moved_start[s], moved_start[s + 1]):
                 if moved_items[k] == other:
                     asked = ask(
+                        row,
+                        column,
                         local,
-                        centre[other],
-                        radius[other],
+                        other,
+                        centre,
+                        radius,
                         epsilon,
-                        axes[column],
-                        origin[column],
-                        directions[variant[row]],
-                        distance[row],
+                        axes,
+                        origin,
+                        variant,
+                        directions,
+                        distance,
                         word,
-                        marks[column],
+                        number,
+                        marks,
                     )
                     found += asked
                     if asked > 0:
@@ -288,7 +299,8 @@ def update_rows(
             answer(
                 occluded8,
                 part_scene[other],
-                from_mesh[other],
+                other,
+                from_mesh,
                 start,
                 count,
                 which,
@@ -301,6 +313,7 @@ def update_rows(
                 packet,
                 valid,
                 word,
+                number,
                 marks,
             )
     counts[TRACED] += _follow(
@@ -321,8 +334,10 @@ def update_rows(
         vertex_offsets,
         frames,
         packet,
+        words,
         valid,
         word,
+        number,
         marks,
         vertex,
         cell,
