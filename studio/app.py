@@ -81,10 +81,13 @@ class PluginShading:
 
     def indirect(self, choice: IndirectChoice) -> IndirectChoice | None:
         """The choice with its parameters, checked."""
-        if choice.method not in self._services.registry.names("indirect"):
+        from studio_core.shading.indirect import KIND
+        from studio_core.shading.offline import indirect_choice
+
+        registry = self._services.registry
+        if choice.method not in registry.names(KIND):
             return None  # of a plugin that is not there
-        method = self._services.registry.get("indirect", choice.method)
-        return IndirectChoice(choice.method, build(method.Params, choice.params))
+        return indirect_choice(registry, choice.method, choice.params)
 
 
 @dataclass

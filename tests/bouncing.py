@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from studio_core.contract import API, Plugin
 from studio_core.params import param
 from studio_core.registry import PluginHost
 from studio_core.scene.diff import Aspect
@@ -142,3 +143,27 @@ class BouncingHost:
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self.host, name)
+
+
+class Settling(Bounce):
+    """One that can follow light until it settles."""
+
+    id, label = "settling", "Until it settles"
+    notes = "Nothing between two objects stops their light"
+
+    @dataclass(frozen=True)
+    class Params:
+        """How often light goes on."""
+
+        bounces: int = param(3, "Bounces", "How often light goes on", low=1, high=16)
+        settle: bool = param(False, "Until it settles", "As many bounces as matter")
+        rays: int = param(64, "Rays", "From every point", low=1, high=1024, advanced=True)
+
+
+BOUNCE, SETTLING = Bounce(), Settling()
+PLUGIN = Plugin(
+    id="bouncing",
+    api=API,
+    provides={KIND: {"gather": "bouncing:SETTLING", "even": "bouncing:BOUNCE"}},
+)
+"""With the method that sessions begin with."""

@@ -108,6 +108,7 @@ def see(scene: Scene, view: View) -> Picture:
         valid=np.ones(8, bool),
         directions=1024,
         counts={"rays": 12345, "skipped_packets": 678},
+        facts={},
     )
     covered = (index >= 0).astype(np.float32)
     return Picture(radiance, linear, covered, index, nearest.astype(np.float32))

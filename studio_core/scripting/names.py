@@ -29,6 +29,7 @@ from studio_core.scripting.placing import Placing
 from studio_core.scripting.shelved import Shelved
 from studio_core.scripting.shown import help_text, overview
 from studio_core.session import Session, View
+from studio_core.shading.artifacts import Picture
 from studio_core.shading.job import Job
 
 T = TypeVar("T")
@@ -308,6 +309,9 @@ class Names(Placing, Patterns, Shelved):
         self, size: tuple[int, int] = (960, 540), camera: Thing | None = None, antialias: int = 2
     ) -> npt.NDArray[np.float32]:
         """(height, width, 3) scene-linear radiance, as a camera sees it or as it is looked at now."""
+        return self._picture(size, camera, antialias).linear
+
+    def _picture(self, size: tuple[int, int], camera: Thing | None, antialias: int) -> Picture:
         from studio_core.shading import offline
 
         width, height = size
@@ -318,12 +322,14 @@ class Names(Placing, Patterns, Shelved):
         view = dataclasses.replace(view, antialias=antialias, fine_edges=antialias > 1)
         scene, session, services = self.scene, self._session, self._services()
 
-        def work(job: Job) -> npt.NDArray[np.float32]:
+        def work(job: Job) -> Picture:
             backend = self._registry.get("backend", session.backend)
             params = offline.backend_params(backend, session.params)
-            return offline.picture(scene, view, backend, params, services, job).linear
+            choice = offline.session_choice(session, self._registry)
+            given = (scene, view, backend, params, services, job)
+            return offline.picture(*given, indirect=choice, light=session.light)
 
-        made: npt.NDArray[np.float32] = self._run("Rendering", work)
+        made: Picture = self._run("Rendering", work)
         return made
 
     def render(
@@ -341,10 +347,11 @@ class Names(Placing, Patterns, Shelved):
         path = Path(path)
         if path.suffix.lower() not in (".png", ".exr"):
             raise InputError(f"{path.name}: pictures are written as .png or .exr")
-        linear = self.picture(size, camera, antialias)
+        made = self._picture(size, camera, antialias)
         ev = self._session.exposure if exposure is None else exposure
-        kind: Any = tonemap or self._session.tonemap
-        write_picture(path, linear, exposure=ev, kind=kind)
+        ev, shown = made.shown_with(ev, tonemap or self._session.tonemap)
+        kind: Any = shown
+        write_picture(path, made.linear, exposure=ev, kind=kind)
         return path
 
     # files and help

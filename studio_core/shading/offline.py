@@ -16,7 +16,7 @@ from studio_core.raster import PictureStage
 from studio_core.scene.bounds import scene_bounds
 from studio_core.scene.diff import Changes
 from studio_core.scene.nodes import Camera, Scene
-from studio_core.session import ALL, View, framing
+from studio_core.session import ALL, Session, View, framing
 from studio_core.shading.artifacts import Casters, MeasuredError, Picture, Radiance
 from studio_core.shading.error_meter import ErrorMeter
 from studio_core.shading.frame import Frame, IndirectChoice
@@ -35,6 +35,13 @@ def backend_params(backend: ShadingBackend | IndirectMethod, values: Mapping[str
 def indirect_choice(registry: Registry, method: str, values: Mapping[str, object]) -> IndirectChoice:
     """A method of light between surfaces with its parameters, as `backend_params` has them."""
     return IndirectChoice(method, backend_params(registry.get(KIND, method), values))
+
+
+def session_choice(session: Session, registry: Registry) -> IndirectChoice | None:
+    """How light goes on between surfaces in a session; None where its method is not there, too."""
+    if not session.bouncing or session.indirect not in registry.names(KIND):
+        return None
+    return indirect_choice(registry, session.indirect, session.indirect_params.get(session.indirect, {}))
 
 
 def scene_view(scene: Scene, camera: str | None, width: int, height: int) -> View:

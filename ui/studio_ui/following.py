@@ -8,7 +8,7 @@ from PySide6.QtCore import QTimer
 from PySide6.QtWidgets import QMainWindow
 
 from studio_core.errors import LucarneError
-from studio_core.scene.diff import Changes
+from studio_core.scene.diff import Aspect, Changes
 from studio_core.scene.nodes import Scene
 from studio_core.shading.artifacts import MeasuredError
 from studio_ui.actions.action_set import ActionSet
@@ -51,7 +51,7 @@ class Following:
             context.document.changed.connect(self._edited),
             context.session.selected.connect(self.soon),
             context.session.displayed.connect(self._display),
-            context.session.changed.connect(lambda _: self._backend()),
+            context.session.changed.connect(self._computed),
             context.editing.began.connect(context.feed.hold),
             context.editing.settled.connect(context.feed.release),
             context.editing.settled.connect(self.soon),
@@ -117,6 +117,11 @@ class Following:
     def _display(self) -> None:
         session = self._context.session
         self._viewport.set_display(session.exposure, session.tonemap)
+
+    def _computed(self, aspect: Aspect) -> None:
+        if aspect & (Aspect.QUALITY | Aspect.INDIRECT):
+            self._backend()
+            self.soon()
 
     def _backend(self) -> None:
         session = self._context.session

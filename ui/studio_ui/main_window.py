@@ -66,6 +66,7 @@ from studio_ui.shortcuts import Shortcuts
 from studio_ui.status import StatusBar
 from studio_ui.toolbar import Toolbar
 from studio_ui.views.aids import ViewAids
+from studio_ui.views.between import Between
 from studio_ui.views.camera_pictures import CameraPictures
 from studio_ui.views.cameras import Cameras
 from studio_ui.views.controls import ViewControls
@@ -211,6 +212,7 @@ class MainWindow(QMainWindow):
             TextureCoordinates(context),
             self.magnet,
             self.cameras,
+            Between(context),
             self.aids,
             self.appearance,
             self.layout_,

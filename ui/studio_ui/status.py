@@ -140,7 +140,10 @@ class StatusBar(QStatusBar):
         name = node.name if node is not None else "background"
         far = math.isfinite(probe.distance)
         place = f", {number_style(self).text(probe.distance, 'm', 2)}" if far else ""
-        self.pixel.setText(f"{name}{place}: {red:.3g} {green:.3g} {blue:.3g}")
+        told = f"{red:.3g} {green:.3g} {blue:.3g}"
+        if probe.share is not None:
+            told = "" if math.isnan(probe.share) else f"{probe.share:.0%} from other surfaces"
+        self.pixel.setText(f"{name}{place}: {told}" if told else f"{name}{place}")
 
     def _fit(self) -> None:
         """The picture's numbers go first; a place stays for messages and for what is under the mouse."""

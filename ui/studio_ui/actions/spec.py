@@ -59,5 +59,6 @@ REASONS = {
     "picture": "There is no picture yet",
     "furnished": "There is nothing in the scene",
     "computing": "Nothing is being computed",
+    "bouncing": "No plugin computes light between surfaces",
 }
 """Every condition that `enabled` names, with what is told while it does not hold."""

@@ -32,6 +32,12 @@ def _frame(aspect: str) -> ActionSpec:
     )
 
 
+def _light(name: str, text: str, tip: str) -> ActionSpec:
+    return ActionSpec(
+        f"view.light_{name}", text, "View/Light shown", "", tip, group="shown", checked=f"light_{name}"
+    )
+
+
 ITEMS: tuple[Item, ...] = (
     ActionSpec("view.frame_selection", "Frame selection", "View", "F",
                "See all of what is chosen (or everything)", icon="frame", bar=True, canvas=True),
@@ -73,6 +79,14 @@ ITEMS: tuple[Item, ...] = (
     SEPARATOR,
     ActionSpec("view.brighter", "Brighter", "View", "+", "Half an EV more exposure", canvas=True),
     ActionSpec("view.darker", "Darker", "View", "-", "Half an EV less exposure", canvas=True),
+    ActionSpec("shade.bounces", "Light between surfaces", "View", "",
+               "Light goes on from surface to surface: colours tint what stands beside them", icon="bounce",
+               bar=True, enabled="bouncing", checked="bounces"),
+    _light("all", "All light", "The picture as the eye would see it"),
+    _light("direct", "Straight from lamps and sky", "Without light that comes by way of other surfaces"),
+    _light("indirect", "From other surfaces", "Only light that comes by way of other surfaces"),
+    _light("share", "Share from other surfaces",
+           "How much of the light comes by way of other surfaces, in colours"),
     ActionSpec("view.cube", "View cube", "View", "",
                "Which way one looks; click a side, an edge or a corner to look from there", checked="cube"),
     ActionSpec("view.grid", "Ground grid", "View", "G", "Lines on the ground: decimetres, metres, ten metres",

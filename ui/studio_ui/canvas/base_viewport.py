@@ -16,6 +16,7 @@ from studio_core.session import View
 from studio_core.shading.artifacts import Picture
 from studio_ui.canvas.glyphs import Glyph
 from studio_ui.canvas.hand import Hand
+from studio_ui.canvas.legend import paint_legend
 from studio_ui.canvas.overlay import NOTHING, Overlay, glyph_near, guides
 from studio_ui.canvas.overlay_painter import paint_badge, paint_message, paint_overlay
 from studio_ui.canvas.projection import eye_of, project, ray
@@ -136,6 +137,8 @@ class BaseViewport(Hand):
             paint_message(painter, size, self._message, self._theme)
         if self._picture is not None:
             paint_badge(painter, size, self.freshness, self._theme)
+            if self._picture.share is not None:
+                paint_legend(painter, size)
 
     # where things are
 
@@ -163,12 +166,13 @@ class BaseViewport(Hand):
             return None
         index = int(self._picture.node[row, column])
         red, green, blue = (float(c) for c in self._picture.linear[row, column])
+        share = None if self._picture.share is None else float(self._picture.share[row, column])
         node = self._picture.nodes[index] if index >= 0 else None
         distance = float(self._picture.distance[row, column])
         point = None
         if np.isfinite(distance):
             point = vec3(eye_of(self._view) + ray(self._view, across, down) * distance)
-        return Probe(node, distance, (red, green, blue), point)
+        return Probe(node, distance, (red, green, blue), point, share)
 
     def glyph_at(self, x: float, y: float) -> NodeId | None:
         """The lamp or camera drawn near a point of the canvas."""

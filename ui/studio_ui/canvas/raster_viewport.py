@@ -35,7 +35,8 @@ class RasterViewport(BaseViewport):
     def _develop(self) -> None:
         self._image = None
         if self._picture is not None:
-            pixels = tonemap(self._picture.linear, self._exposure, self._tonemap)
+            shown_with = self._picture.shown_with(self._exposure, self._tonemap)
+            pixels = tonemap(self._picture.linear, *shown_with)
             if self._grid:
                 strength = grid_strength(self._view.sized(*pixels.shape[1::-1]), self._picture.distance)
                 colour = np.array(GRID, np.float32) * 255

@@ -47,13 +47,15 @@ class Pointer:
 class Probe:
     """What lies under a point of the canvas: node (None: nothing), metres along the ray, linear radiance.
 
-    `point` is where that is in the world; None where there is nothing.
+    `point` is where that is in the world; None where there is nothing. `share` of its light came by way of
+    other surfaces, in a picture that shows that.
     """
 
     node: NodeId | None
     distance: float
     radiance: tuple[float, float, float]
     point: Vec3 | None = None
+    share: float | None = None
 
 
 class Viewport(Protocol):

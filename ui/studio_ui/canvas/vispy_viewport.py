@@ -148,12 +148,14 @@ class VispyViewport(BaseViewport):
         smooth = 4 * width * height <= SMOOTH_SAMPLES
         if self._slow() and self.freshness not in _STILL:
             smooth = False
+        shown_with = (self._exposure, self._tonemap)
+        if self._picture is not None:
+            shown_with = self._picture.shown_with(*shown_with)
         accent, ground = QColor(theme.mark), QColor(theme.canvas)
         look = Look(
             self.view.sized(width, height),
             2 if smooth else 1,
-            self._exposure,
-            self._tonemap,
+            *shown_with,
             self._selection,
             self._rim(width),
             (accent.redF(), accent.greenF(), accent.blueF()),

@@ -146,7 +146,8 @@ class Keeper:
         shown, session = self._context.feed.last, self._context.session
         if shown is None:
             return None
-        linear, exposure, kind = shown.picture.linear, session.exposure, session.tonemap
+        linear = shown.picture.linear
+        exposure, kind = shown.picture.shown_with(session.exposure, session.tonemap)
         return lambda: self.thumbnails.keep(path, linear, exposure, kind)
 
     def _drop_leftover(self) -> None:

@@ -1,4 +1,4 @@
-"""Shading: which backend computes the picture, and how finely."""
+"""Shading: which backend computes the picture, how finely, and how light goes on between surfaces."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from studio_ui.context import Context
 from studio_ui.forms.fields import Combo, tip
 from studio_ui.forms.param_form import ParamForm, form_label, form_layout
 from studio_ui.forms.sinks import PlainSink
+from studio_ui.panels.between import BetweenSection
 from studio_ui.panels.panel import Panel, clear, note
 from studio_ui.quality import NAME, QualityControl, offers_quality
 
@@ -29,7 +30,11 @@ class ShadingPanel(Panel):
         self.form: ParamForm | None = None
         self.combo = Combo()
         self.quality: QualityControl | None = None
-        self._column = self.scroller()
+        column = self.scroller()
+        self._column = self.inside(column)
+        self.between = BetweenSection(context)
+        column.addWidget(self.between)
+        column.addStretch(1)
         self.subscriptions.add(
             context.warmed.connect(self.refresh), context.session.changed.connect(self._told)
         )
@@ -68,12 +73,12 @@ class ShadingPanel(Panel):
             self.form.show_values(self._values(backend, session.params))
         elif not self.context.warm:
             self._column.addWidget(note("Loading…"))
-        self._column.addStretch(1)
         self._shown = session.backend
 
     def close_panel(self) -> None:
         """Stop listening."""
         super().close_panel()
+        self.between.close_panel()
         self._close_quality()
 
     def _close_quality(self) -> None:

@@ -13,7 +13,7 @@ GROUND = 34  # grey of what is not known yet
 
 def shown_image(shown: Shown, exposure: float, kind: str) -> QImage:
     """The picture in its own pixels, without handles and outlines."""
-    pixels = np.ascontiguousarray(tonemap(shown.picture.linear, exposure, kind))
+    pixels = np.ascontiguousarray(tonemap(shown.picture.linear, *shown.picture.shown_with(exposure, kind)))
     height, width, _ = pixels.shape
     return QImage(pixels.data, width, height, 3 * width, QImage.Format.Format_RGB888).copy()
 

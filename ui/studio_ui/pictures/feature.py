@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +15,7 @@ from studio_core.arrays import frozen_map
 from studio_core.errors import PluginError
 from studio_core.params import param_infos
 from studio_core.scene.nodes import Camera
-from studio_core.session import View
+from studio_core.session import ALL, View
 from studio_core.shading.job import Job
 from studio_core.shading.scheduler import ComputeThread, Executor
 from studio_ui.ask import Ask
@@ -143,7 +143,15 @@ class PictureOut:
             session.tonemap,
             session.backend,
             frozen_map(params),
+            *self._bounces(),
         )
+
+    def _bounces(self) -> tuple[str, Mapping[str, Any], str]:
+        """How light goes on between surfaces ("": not at all), and which light is looked at."""
+        session = self.context.session
+        if not session.bouncing or session.indirect not in self.context.host.names("indirect"):
+            return "", frozen_map(), ALL
+        return session.indirect, session.indirect_params.get(session.indirect, frozen_map()), session.light
 
     def _final(self, backend: str) -> dict[str, Any]:
         if not self.context.warm:

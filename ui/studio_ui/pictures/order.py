@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from studio_core.arrays import frozen_map
+from studio_core.session import ALL, SHARE
 
 MOST_PIXELS = 16384
 MM_PER_INCH = 25.4
@@ -99,6 +100,9 @@ class Look:
     tonemap: str = "srgb"
     backend: str = "cuts"
     params: Mapping[str, Any] = field(default_factory=frozen_map)
+    indirect: str = ""
+    indirect_params: Mapping[str, Any] = field(default_factory=frozen_map)
+    light: str = ALL
 
     def arguments(self) -> list[str]:
         """For the command line."""
@@ -106,10 +110,16 @@ class Look:
         made += ["--bits", str(self.kind.bits), f"--exposure={self.exposure:g}", "--tonemap", self.tonemap]
         made += ["--dpi", f"{self.size.dpi:g}"] if self.size.dpi else []
         flags = {"--alpha": self.alpha, "--lights": self.lights, "--measure": self.measure}
+        if self.light == SHARE and self.indirect:
+            flags = {}  # false colours have none of these
         made += [name for name, on in flags.items() if on]
         made += ["--backend", self.backend]
         for name, value in self.params.items():
             made += ["--param", f"{name}={_text(value)}"]
+        if self.indirect:
+            made += ["--indirect", self.indirect, "--light", self.light]
+            for name, value in self.indirect_params.items():
+                made += ["--indirect-param", f"{name}={_text(value)}"]
         return made
 
 

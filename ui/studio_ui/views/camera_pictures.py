@@ -10,6 +10,7 @@ import numpy as np
 from PySide6.QtGui import QImage
 
 from studio_core.scene.nodes import Camera, NodeId, Scene
+from studio_core.session import ALL
 from studio_core.shading.job import Job
 from studio_core.signal import Signal
 from studio_ui.canvas.framing import frame_in
@@ -48,7 +49,7 @@ class CameraPictures:
     def take(self) -> None:
         """Keep the picture that is shown, if it is at rest and of the camera that is looked through."""
         camera, last = self._cameras.camera(), self._context.feed.last
-        if camera is None or last is None or last.moving:
+        if camera is None or last is None or last.moving or self._context.session.light != ALL:
             return
         if not last.final and self.find(camera) is not None:
             return  # one of the first is enough until the last
