@@ -18,7 +18,7 @@ from studio_core.false_colour import false_colours, linear_colours
 from studio_core.kernels.tonemap import tonemap
 from studio_core.scene.nodes import Scene
 from studio_core.session import ALL, DIRECT, INDIRECT, SHARE, Session
-from studio_core.shading.artifacts import Picture
+from studio_core.shading.artifacts import Error, MeasuredError, Picture
 from studio_plugins.brdfs import plugin as brdfs
 from studio_plugins.cuts import plugin as cuts
 from studio_plugins.meshes import plugin as meshes
@@ -181,6 +181,16 @@ def test_facts_are_told_in_words(driver: Driver) -> None:
     picture = dataclasses.replace(last.picture, radiance=radiance)
     driver.feed.shown.emit(dataclasses.replace(last, picture=picture))
     assert part.facts.text() == "12 rays"
+
+
+def test_the_error_of_light_between_surfaces_is_told(driver: Driver) -> None:
+    whole, own = Error(0.02, 0.001, 256), Error(0.05, 0.002, 256)
+    status = driver.window.status
+    status.show_error(MeasuredError(whole, whole, {}, own), {})
+    assert status.error.text() == f"error: {whole}"
+    assert f"of light between surfaces alone: {own}" in status.error.toolTip()
+    status.show_error(MeasuredError(whole, whole), {})
+    assert "between surfaces" not in status.error.toolTip()
 
 
 def test_projects_remember_it() -> None:

@@ -127,6 +127,8 @@ class StatusBar(QStatusBar):
         lines = [_ERROR, f"of the lit points alone: {error.vertices}"]
         if error.picture.p99:
             lines.append(f"one place in a hundred is off by more than {100 * error.picture.p99:.1f} %")
+        if error.indirect is not None:
+            lines.append(f"of light between surfaces alone: {error.indirect}")
         lines += [f"by {names.get(layer, layer)} alone: {part}" for layer, part in error.layers.items()]
         self.error.setToolTip("\n".join(lines))
 
