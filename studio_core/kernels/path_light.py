@@ -1,9 +1,9 @@
 """Path tracing: light at a surface, and where the path goes on from there.
 
 At each surface one lamp is looked at, chosen by what it would give unhindered, and one place of the
-environment, chosen by its radiance; the latter is combined with rays that leave the scene by the balance
-heuristic (Veach & Guibas 1995). A path goes on by the cosine or by one term of the surface's BRDF, chosen by
-its albedo times the size of its coefficient; terms may be negative.
+environment, chosen by its radiance; area lamps and environment are combined with the rays that go on by the
+balance heuristic (Veach & Guibas 1995). A path goes on by the cosine or by one term of the surface's BRDF,
+chosen by its albedo times the size of its coefficient; terms may be negative.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ from studio_core.kernels.path_state import (
     F32,
     F64,
     I64,
+    SOME,
     SPOT,
     SUNS,
     Lights,
@@ -28,6 +29,7 @@ from studio_core.kernels.path_state import (
     Models,
     Paths,
     Tracer,
+    area_weight,
     next_random,
 )
 from studio_core.kernels.radiance import LOWEST_VIEW, surface_frame
@@ -35,8 +37,6 @@ from studio_core.kernels.sampling import cosine_direction
 
 BINS = 8
 """Cosines of the view for which `Models.albedo` is known."""
-SOME = 0.1
-"""Cosine added for lamps whose middle may be under the horizon, or turned away, while a part is not."""
 COSINE_SHARE = 0.05
 """Of paths, go on by the cosine where terms draw directions of their own."""
 INV_PI = 1 / np.pi
@@ -61,7 +61,8 @@ def light_paths(
     """Adds the light that reaches the surfaces of paths active[start:stop], and gives each its next ray.
 
     Shapes start at offset (R,) of `data`, by the paths' rows. `last`: the next ray counts only where it
-    leaves the scene, so without an environment there is none. `roulette`: dim paths end by chance.
+    leaves the scene or passes an area lamp, so without these there is none. `roulette`: dim paths end by
+    chance.
     """
     packet, valid = new_packet()
     packet.view(np.uint32)[MASK, :] = OPAQUE
@@ -165,8 +166,7 @@ def light_paths(
                     cosine = max((ex * nx + ey * ny + ez * nz) / away, 0.0)
                     back = -(ex * lights.axis[i, 0] + ey * lights.axis[i, 1] + ez * lights.axis[i, 2]) / away
                     if kind == AREA:
-                        square += lights.spread[i]
-                        weight = lights.power[i] * (cosine + SOME) * (back + SOME) if back > 0.0 else 0.0
+                        weight = area_weight(lights.power[i], lights.spread[i], cosine, back, square) * square
                     elif kind == SPOT:
                         weight = (
                             lights.power[i] * cosine * _falloff(back, lights.cones[i, 1], lights.cones[i, 0])
@@ -178,7 +178,8 @@ def light_paths(
                     upto += weight
                     if next_random(paths.random, n) * upto < weight:
                         lamp, own = i, weight
-            far[LAMP, lane], wi[6 + LAMP] = -1.0, np.float32(-1)
+            paths.lamps[n] = upto
+            far[LAMP, lane], wi[6 + LAMP], shone = -1.0, np.float32(-1), 0.0
             wi[LAMP] = wi[3 + LAMP] = np.float32(0)
             for c in range(3):
                 given[LAMP, lane, c] = 0.0
@@ -219,8 +220,11 @@ def light_paths(
                         + aim[1] * lights.axis[lamp, 1]
                         + aim[2] * lights.axis[lamp, 2]
                     )
-                    if kind == AREA:
-                        pick *= max(back, 0.0)
+                    if kind == AREA and back > 0.0:
+                        shone = away * away / (pick * back * lights.area[lamp])
+                        pick *= back
+                    elif kind == AREA:
+                        pick = 0.0
                     elif kind == SPOT:
                         pick *= _falloff(back, lights.cones[lamp, 1], lights.cones[lamp, 0])
                     for c in range(3):
@@ -281,11 +285,13 @@ def light_paths(
                     mixed[way] /= whole
             for c in range(3):
                 given[LAMP, lane, c] *= reflected[LAMP, c] * paths.throughput[n, c]
+                if shone > 0.0:  # area lamps are found by rays that go on, too
+                    given[LAMP, lane, c] *= shone / (shone + mixed[LAMP])
                 given[SKY, lane, c] *= (
                     reflected[SKY, c] * paths.throughput[n, c] / max(sky + mixed[SKY], 1e-30)
                 )
                 ray[LAMP, lane, c], ray[SKY, lane, c] = world[LAMP, c], world[SKY, c]
-            alive = mixed[NEXT] > 0.0 and not (last and lights.k == 0)
+            alive = mixed[NEXT] > 0.0 and not (last and lights.k == 0 and lights.areas == 0)
             most = 0.0
             for c in range(3):
                 paths.throughput[n, c] *= reflected[NEXT, c] / max(mixed[NEXT], 1e-30)

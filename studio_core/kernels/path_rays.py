@@ -1,4 +1,4 @@
-"""Path tracing: where rays go. What they meet, and what the environment sends along those that leave.
+"""Path tracing: where rays go, what they meet, and what lamps and the environment send along them.
 
 Light is stopped by what is opaque. The inside of closed parts is black.
 """
@@ -24,7 +24,7 @@ from studio_core.kernels.packets import (
     clear_hits,
     new_packet,
 )
-from studio_core.kernels.path_state import ENDED, I64, Lights, Mesh, Paths, Tracer
+from studio_core.kernels.path_state import AREA, ENDED, I64, Lights, Mesh, Paths, Tracer, area_weight
 
 NO_BACK = np.uint32(0xFFFFFFFF)
 LEAST_SHARE = 1e-4
@@ -45,9 +45,9 @@ def follow_paths(
 ) -> None:
     """Leads paths active[start:stop] to the surface that their ray meets first, or ends them.
 
-    Rays that leave the scene, where `escapes` says that they may count, bring the environment's light,
-    weighted with the density of choosing the same direction as a light's (Veach & Guibas 1995, balance
-    heuristic). With `last` nothing but that is wanted of them.
+    Rays that leave the scene bring the environment's light, and those that pass area lamps theirs, where
+    `escapes` says that they may count: weighted with the density of choosing the same direction as a light's
+    (Veach & Guibas 1995, balance heuristic). With `last` nothing but that is wanted of them.
     """
     packet, valid = new_packet()
     words = packet.view(np.uint32)
@@ -64,15 +64,18 @@ def follow_paths(
                 packet[ORIGIN + axis, lane] = paths.origin[n, axis]
                 packet[DIRECTION + axis, lane] = paths.direction[n, axis]
             packet[TFAR, lane] = np.inf
-        if last:
+        shortly = last and lights.areas == 0  # whether something is met says all
+        if shortly:
             call_address(tracer.occluded8, valid, tracer.scene, packet, 0)
         else:
             call_address(tracer.intersect8, valid, tracer.scene, packet, 0)
         for lane in range(count):
             n = active[first + lane]
             paths.material[n] = ENDED
-            missed = packet[TFAR, lane] >= 0 if last else words[GEOMETRY, lane] == NO_HIT
+            missed = packet[TFAR, lane] >= 0 if shortly else words[GEOMETRY, lane] == NO_HIT
             dx, dy, dz = paths.direction[n, 0], paths.direction[n, 1], paths.direction[n, 2]
+            if escapes and lights.areas > 0:
+                _pass_lamps(n, np.inf if missed else np.float64(packet[TFAR, lane]), lights, paths)
             if missed:
                 if escapes and lights.k > 0:
                     leaf = leaf_of(dx, dy, dz, lights.k)
@@ -149,6 +152,43 @@ def follow_paths(
             for c in range(2):
                 paths.uv[n, c] = w0 * mesh.uvs[i, c] + w1 * mesh.uvs[j, c] + w2 * mesh.uvs[k, c]
             paths.material[n] = paths.row[n] = mesh.material[i]
+
+
+@kernel
+def _pass_lamps(n: int, far: float, lights: Lights, paths: Paths) -> None:
+    """Adds the light of area lamps that ray n passes before `far`."""
+    for i in range(len(lights.kind)):
+        if lights.kind[i] != AREA:
+            continue
+        ahead, back, square, cosine, facing = 0.0, 0.0, 0.0, 0.0, 0.0
+        for axis in range(3):
+            gap = lights.position[i, axis] - paths.origin[n, axis]
+            ahead += gap * lights.axis[i, axis]
+            back -= paths.direction[n, axis] * lights.axis[i, axis]
+            square += gap * gap
+            cosine += gap * paths.normal[n, axis]
+        if not (back > 1e-9 and ahead < 0.0):
+            continue
+        away = -ahead / back
+        if away > far:
+            continue
+        a, b, wide, tall = 0.0, 0.0, 0.0, 0.0
+        for axis in range(3):
+            place = paths.origin[n, axis] + away * paths.direction[n, axis] - lights.position[i, axis]
+            a += place * lights.across[i, axis]
+            b += place * lights.up[i, axis]
+            wide += lights.across[i, axis] * lights.across[i, axis]
+            tall += lights.up[i, axis] * lights.up[i, axis]
+        if 2.0 * abs(a) > wide or 2.0 * abs(b) > tall:
+            continue
+        square = max(square, 1e-12)
+        middle = np.sqrt(square)
+        facing = -ahead / middle
+        weight = area_weight(lights.power[i], lights.spread[i], cosine / middle, facing, square)
+        chance = weight / max(paths.lamps[n], 1e-300) * away * away / (back * lights.area[i])
+        share = paths.density[n] / max(paths.density[n] + chance, 1e-30)
+        for c in range(3):
+            paths.radiance[n, c] += paths.throughput[n, c] * lights.gain[i, c] / lights.area[i] * share
 
 
 __all__ = ["LEAST_SHARE", "follow_paths"]

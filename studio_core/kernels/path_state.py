@@ -29,9 +29,9 @@ class Paths(NamedTuple):
     """N paths at their newest ray or surface.
 
     origin, direction (N, 3) of the ray; throughput (N, 3); radiance (N, 3) found so far; density (N,) per
-    steradian with which the ray was drawn; random (N,) states. Where the ray meets a surface: normal,
-    geometric (N, 3), tangent (N, 4), uv (N, 2), material and row (N,) of its BRDF; a path with the material
-    `ENDED` is over.
+    steradian with which the ray was drawn; random (N,) states; lamps (N,): the sum of what lamps would give
+    where the ray starts, by which one was chosen. Where the ray meets a surface: normal, geometric (N, 3),
+    tangent (N, 4), uv (N, 2), material and row (N,) of its BRDF; a path with the material `ENDED` is over.
     """
 
     origin: F32
@@ -40,6 +40,7 @@ class Paths(NamedTuple):
     radiance: F32
     density: F32
     random: U64
+    lamps: F64
     normal: F32
     geometric: F32
     tangent: F32
@@ -57,6 +58,7 @@ class Paths(NamedTuple):
             radiance=np.zeros((count, 3), np.float32),
             density=np.zeros(count, np.float32),
             random=np.zeros(count, np.uint64),
+            lamps=np.zeros(count),
             normal=np.zeros((count, 3), np.float32),
             geometric=np.zeros((count, 3), np.float32),
             tangent=np.zeros((count, 4), np.float32),
@@ -123,9 +125,10 @@ class Lights(NamedTuple):
     """L lamps with their gains, suns, and the environment's leaves.
 
     kind (L,); position, axis, across, up (L, 3); cones (L, 2): cosines of cone and inner cone; spread (L,):
-    tangent of half a sun's angle; gain (L, 3); power (L,) by which lamps are chosen. Suns: towards (Q, 3),
-    sun (Q, 3) irradiance, sun_upto (Q,) running sum of their choice. Leaves of 2^k directions: radiance
-    (S, 3), chance (S,) per steradian with which they are chosen, upto (S,) its running sum; k = 0: none.
+    tangent of half a sun's angle, or a twelfth of the squared sides of an area lamp; gain (L, 3), of area
+    lamps times their area (L,); power (L,) by which lamps are chosen. Suns: towards (Q, 3), sun (Q, 3)
+    irradiance; sun_upto (Q,) running sum of their choice. Leaves of 2^k directions: radiance (S, 3), chance (S,) per
+    steradian with which they are chosen, upto (S,) its running sum; k = 0: none. `areas` counts area lamps.
     """
 
     kind: I64
@@ -136,6 +139,7 @@ class Lights(NamedTuple):
     cones: F64
     spread: F64
     gain: F64
+    area: F64
     power: F64
     towards: F32
     sun: F32
@@ -144,12 +148,23 @@ class Lights(NamedTuple):
     radiance: F32
     chance: F32
     upto: F64
+    areas: int
 
 
+SOME = 0.1
+"""Cosine added for lamps whose middle may be under the horizon, or turned away, while a part is not."""
 _STEP = np.uint64(0x9E3779B97F4A7C15)
 _FIRST, _SECOND = np.uint64(0xBF58476D1CE4E5B9), np.uint64(0x94D049BB133111EB)
 _A, _B, _C, _D = np.uint64(30), np.uint64(27), np.uint64(31), np.uint64(40)
 _UNIT = np.float32(2.0**-24)
+
+
+@kernel
+def area_weight(power: float, spread: float, cosine: float, back: float, square: float) -> float:
+    """What an area lamp counts when one is chosen, by cosines at the surface and at the lamp's middle."""
+    if not back > 0.0:
+        return 0.0
+    return power * (max(cosine, 0.0) + SOME) * (back + SOME) / (square + spread)
 
 
 @kernel

@@ -134,6 +134,7 @@ class PathWorlds:
         gains = shown_gains(scene)
         lamps = [lamp for lamp in lighting.lamps if gains.get(lamp.node, np.zeros(3)).any()]
         rows = [_lamp(lamp, gains[lamp.node], centre) for lamp in lamps]
+        rows = [row for row in rows if row[-1] > 0]
         sky = np.zeros(3)
         if lighting.environment is not None:
             sky = gains.get(lighting.environment.id, sky)
@@ -148,7 +149,7 @@ class PathWorlds:
         named = dict(zip(Lights._fields, columns, strict=False))
         return Lights(
             **named, towards=towards, sun=light, sun_upto=upto, k=k, radiance=leaves[0], chance=leaves[1],
-            upto=leaves[2],
+            upto=leaves[2], areas=int(sum(row[0] == AREA for row in rows)),
         )  # fmt: skip
 
     def _environment(self, tree: LightTree, gain: F64) -> tuple[F32, F32, F64]:
@@ -177,21 +178,23 @@ _NO_LAMPS = [
     np.zeros(0),
     np.zeros((0, 3)),
     np.zeros(0),
+    np.zeros(0),
 ]
-_Row = tuple[int, F64, F64, F64, F64, tuple[float, float], float, F64, float]
+_Row = tuple[int, F64, F64, F64, F64, tuple[float, float], float, F64, float, float]
 
 
 def _lamp(lamp: Lamp, gain: F64, centre: F64) -> _Row:
-    across, up, spread = lamp.across, lamp.up, 0.0
+    across, up, spread, area = lamp.across, lamp.up, 0.0, 0.0
     if lamp.kind == "area":
-        gain = gain * float(np.linalg.norm(np.cross(across, up)))
+        area = float(np.linalg.norm(np.cross(across, up)))
+        gain = gain * area
         spread = float((across @ across + up @ up) / 12)
     elif lamp.kind == "directional":
         spread = float(np.tan(lamp.angle / 2))
         across, up = disc_axes(lamp.axis)
     cones = (lamp.cos_cone, lamp.cos_inner)
     place = lamp.position - centre
-    return KINDS[lamp.kind], place, lamp.axis, across, up, cones, spread, gain, float(gain.max())
+    return KINDS[lamp.kind], place, lamp.axis, across, up, cones, spread, gain, area, float(gain.max())
 
 
 def _suns(sun: Sun | None, gain: F64) -> tuple[F32, F32, F64]:
@@ -209,7 +212,7 @@ def _sun_row(towards: F32, light: F32) -> _Row:
     length = float(np.linalg.norm(middle))
     axis = -middle / length if length > 0 else np.zeros(3)
     zero, gain = np.zeros(3), light.sum(axis=0, dtype=np.float64)
-    return SUNS, zero, axis, zero, zero, (-1.0, -1.0), 1.0, gain, float(gain.max())
+    return SUNS, zero, axis, zero, zero, (-1.0, -1.0), 1.0, gain, 0.0, float(gain.max())
 
 
 def _mesh(mesh: WorldMesh, centre: F64) -> Mesh:
