@@ -127,8 +127,8 @@ class Lights(NamedTuple):
     kind (L,); position, axis, across, up (L, 3); cones (L, 2): cosines of cone and inner cone; spread (L,):
     tangent of half a sun's angle, or a twelfth of the squared sides of an area lamp; gain (L, 3), of area
     lamps times their area (L,); power (L,) by which lamps are chosen. Suns: towards (Q, 3), sun (Q, 3)
-    irradiance; sun_upto (Q,) running sum of their choice. Leaves of 2^k directions: radiance (S, 3), chance (S,)
-    per steradian with which they are chosen, upto (S,) its running sum; k = 0: none. `areas` counts area
+    irradiance; sun_upto (Q,) running sum of their choice. Leaves of 2^k directions: radiance (S, 3), chance
+    (S,) per steradian with which they are chosen, upto (S,) its running sum; k = 0: none. `areas` counts area
     lamps.
     """
 
