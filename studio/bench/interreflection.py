@@ -39,7 +39,11 @@ F64 = npt.NDArray[np.float64]
 BACKEND = "cuts"
 METHODS = {"": "gather", "paper/": "fields"}
 IN_PARTS = True
-PARTS = ("studio.bench.interreflection_furnace", "studio.bench.interreflection_operator")
+PARTS = (
+    "studio.bench.interreflection_furnace",
+    "studio.bench.interreflection_operator",
+    "studio.bench.interreflection_sky",
+)
 """Modules with further cases: each has `run(report, program, setup)`."""
 BOUNCES = 3
 SURER = 8

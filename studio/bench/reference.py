@@ -71,8 +71,13 @@ def run(report: Report, program: Headless) -> None:
     _start(report)
 
 
-def furniture(environment: str, program: Headless) -> Scene | None:
-    """Sofa and table on a floor of 6 m under a shared map; None where the data is absent."""
+def furniture(
+    environment: str, program: Headless, room: str | None = None, windows: tuple[str, ...] = ()
+) -> Scene | None:
+    """Sofa and table on a floor of 6 m, or in a room, under a shared map; None where the data is absent.
+
+    `room` and `windows` as on the command line.
+    """
     from studio.build_scene import build
 
     root = Path(os.environ.get("LUCARNE_TEST_DATA") or Path(__file__).parents[3] / "shared" / "data")
@@ -85,10 +90,18 @@ def furniture(environment: str, program: Headless) -> Scene | None:
             f"{models / 'oakTable' / 'oakTable.obj'}@1.5,0,0.4,0,0.01",
         ],
         unit="m",
-        floor=6.0,
+        floor=None if room else 6.0,
+        room=room,
+        window=list(windows),
+        door=[],
+        passage=[],
+        without=[],
+        open_top=False,
         env=root / "cc0" / "hdri_polyhaven_cc0" / f"{environment}.exr",
         material=[],
-        camera=["from=1.9,1.3,3.2:to=0.7,0.35,0:fov=38"],
+        ground=None,
+        shadow_floor=False,
+        camera=["from=1.9,1.3,1.7:to=0.7,0.35,0:fov=70" if room else "from=1.9,1.3,3.2:to=0.7,0.35,0:fov=38"],
     )
     return build(options, program.registry)[0]
 
