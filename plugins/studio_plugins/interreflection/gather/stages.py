@@ -238,6 +238,7 @@ class FinalStage:
         mesh, sent, chosen = surfaces.mesh, inputs[Sent], inputs[Chosen]
         wanted, casters = receivers.seen, inputs[Casters]
         met = self._tables(chosen.tier.final, surfaces, casters, wanted, self._meetings, job)
+        traced = 0 if met is self._meetings else met.rays
         self._meetings = met
         lobes = self._lobes.update(frame.scene, surfaces, casters, shapes, receivers, chosen.tier.lobes, job)
         layer = blank_layer(mesh, shapes)
@@ -316,15 +317,15 @@ class FinalStage:
             self._workers.run(len(needed), CHUNK, flat, job)
         if layer.tilts is not None:
             gather_tilts(shapes, mesh, ways, layer.tilts)
-        return self._told(inputs, layer, wanted, met, lobes.rays)
+        return self._told(inputs, layer, wanted, traced, lobes.rays)
 
     def _told(
-        self, inputs: Inputs, layer: LayerRadiance, wanted: Bools, met: Meetings, lobe_rays: int
+        self, inputs: Inputs, layer: LayerRadiance, wanted: Bools, final_rays: int, lobe_rays: int
     ) -> Indirect:
         inner, sent, tier = inputs[Meetings], inputs[Sent], inputs[Chosen].tier
         traced = {
             "rays_between_vertices": inner.rays if Meetings in inputs.rebuilt else 0,
-            "rays_of_receivers": met.rays,
+            "rays_of_receivers": final_rays,
             "rays_of_lobes": lobe_rays,
             "rays_to_lights": sent.rays if Sent in inputs.rebuilt else 0,
             "receivers": int(wanted.sum()),
