@@ -4,7 +4,8 @@
 and 150 %; `window THEME PERCENT` makes one of them), `chair` drags a chair through the settled room as a hand
 does and lets it rest, exact and refined. `capture` has the simulated phone photograph the sample room and the
 capture panel make its light of that. `library` shows the library of materials in both themes. `fit` has a
-ball of the lab photographed and shows the report of the material that is made of it.
+ball of the lab photographed and shows the report of the material that is made of it. `bases` and `products`
+draw figures 8 and 10 of the interreflection paper.
 """
 
 from __future__ import annotations
@@ -347,7 +348,26 @@ def fit() -> None:
     studio.close()
 
 
+def bases() -> None:
+    """Figure 8 of the interreflection paper."""
+    from studio.bench.interreflection_figures import figure_8
+    from studio.bench.plot import svg
+    from studio.headless import Headless
+
+    (HERE / "interreflection-bases.svg").write_text(svg(figure_8(Headless(quiet=True).services)))
+
+
+def products() -> None:
+    """Figure 10 of the interreflection paper."""
+    from studio.bench.interreflection_figures import figure_10
+    from studio.bench.plot import svg
+    from studio.headless import Headless
+
+    (HERE / "interreflection-products.svg").write_text(svg(figure_10(Headless(quiet=True))))
+
+
 if __name__ == "__main__":
     makers = {"room": room, "windows": windows, "window": window, "chair": chair, "capture": capture}
     makers |= {"library": library, "captured": captured, "fit": fit}
+    makers |= {"bases": bases, "products": products}
     makers[sys.argv[1]](*sys.argv[2:])

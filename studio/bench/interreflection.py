@@ -43,6 +43,7 @@ PARTS = (
     "studio.bench.interreflection_furnace",
     "studio.bench.interreflection_operator",
     "studio.bench.interreflection_sky",
+    "studio.bench.interreflection_figures",
 )
 """Modules with further cases: each has `run(report, program, setup)`."""
 BOUNCES = 3

@@ -22,7 +22,7 @@ from studio_plugins.interreflection.fields.lattice import lattice_of
 from studio_plugins.interreflection.fields.precompute import Field, precomputed
 from studio_plugins.interreflection.fields.training import columns, light_places, lit
 
-VERSION = 1
+VERSION = 2
 METHOD = "interreflection fields"
 HALVED = 2
 """How often an object's lattice may be made coarser: half the layers and half the cells along a side."""

@@ -25,7 +25,7 @@ F32 = npt.NDArray[np.float32]
 F64 = npt.NDArray[np.float64]
 I64 = npt.NDArray[np.int64]
 
-SPHERE = 1.25
+SPHERE = 1.6
 HEIGHT = 0.35
 """Of lights over a plate, in halves of its length."""
 
