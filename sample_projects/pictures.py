@@ -6,6 +6,8 @@ import sys
 import tempfile
 from pathlib import Path
 
+from .make import BOUNCING
+
 SIZE = "320x180"
 QUALITY = 82
 
@@ -20,7 +22,8 @@ def main(folder: Path) -> int:
         with tempfile.TemporaryDirectory() as scratch:
             rendered = Path(scratch) / "picture.png"
             picture = ["-o", str(rendered), "--size", SIZE, "--antialias", "4"]
-            status = lucarne(["render", str(project), *picture])
+            light = ["--indirect", "gather", "--bounces", "6"] if project.stem in BOUNCING else []
+            status = lucarne(["render", str(project), *picture, *light])
             if status:
                 return status
             with Image.open(rendered) as made:

@@ -5,7 +5,8 @@ and 150 %; `window THEME PERCENT` makes one of them), `chair` drags a chair thro
 does and lets it rest, exact and refined. `capture` has the simulated phone photograph the sample room and the
 capture panel make its light of that. `library` shows the library of materials in both themes. `fit` has a
 ball of the lab photographed and shows the report of the material that is made of it. `bases` and `products`
-draw figures 8 and 10 of the interreflection paper.
+draw figures 8 and 10 of the interreflection paper. `between` renders the room with the red cabinet with and
+without light between surfaces.
 """
 
 from __future__ import annotations
@@ -32,6 +33,8 @@ sys.path[:0] = [str(ROOT), str(ROOT / "ui"), str(ROOT / "plugins")]
 SIZE = (640, 360)
 WINDOW = (1440, 900)
 STEPS, REST = 32, 24  # pictures of the drag; how long the last one stays, in pictures
+HALF = (480, 270)
+DRAGGED = (-0.95, 0.0, 0.12)  # the red cabinet, metres
 PER_PICTURE = 70  # milliseconds
 Way = tuple[tuple[float, float], tuple[float, float]]
 WAY: Way = ((0.0, 0.0), (1.55, 0.55))  # of the chair over the floor, metres in x and z
@@ -151,6 +154,37 @@ def chair() -> None:
 def captured() -> None:
     """The coffee table, dragged over captured stone in front of the captured sofa."""
     _filmed(frames("captured-room", "Coffee table", TABLE_WAY, TABLE_STEPS), "captured-room")
+
+
+def between() -> None:
+    """Straight light alone and all light, before and after the red cabinet is dragged."""
+    from PIL import Image
+
+    from studio.headless import Headless
+    from studio.samples import sample
+    from studio.verbs import open_scene
+    from studio_core.edits import Move
+    from studio_core.kernels.tonemap import tonemap
+    from studio_core.params import build
+    from studio_core.scene.transform import Transform
+    from studio_core.shading.frame import IndirectChoice
+    from studio_core.shading.offline import picture, scene_view
+
+    program = Headless(quiet=True)
+    scene = open_scene(sample("red-cabinet"))
+    cabinet = next(n for n in scene.nodes.values() if n.name == "Red cabinet")
+    moved = Move({cabinet.id: Transform(DRAGGED) @ cabinet.transform})(scene)
+    backend, method = program.registry.get("backend", "cuts"), program.registry.get("indirect", "gather")
+    choices = (None, IndirectChoice("gather", build(method.Params, {"bounces": 6})))
+    rows = []
+    for shown in (scene, moved):
+        view = dataclasses.replace(scene_view(shown, None, *HALF), antialias=2)
+        made = [
+            picture(shown, view, backend, backend.Params(), program.services, indirect=choice).linear
+            for choice in choices
+        ]
+        rows.append(np.hstack([tonemap(linear, 0.0, "srgb") for linear in made]))
+    Image.fromarray(np.vstack(rows)).save(HERE / "red-cabinet.webp", quality=86, method=6)
 
 
 def _filmed(pictures: Iterator[np.ndarray], name: str) -> None:
@@ -368,6 +402,6 @@ def products() -> None:
 
 if __name__ == "__main__":
     makers = {"room": room, "windows": windows, "window": window, "chair": chair, "capture": capture}
-    makers |= {"library": library, "captured": captured, "fit": fit}
+    makers |= {"library": library, "captured": captured, "fit": fit, "between": between}
     makers |= {"bases": bases, "products": products}
     makers[sys.argv[1]](*sys.argv[2:])
