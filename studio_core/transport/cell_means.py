@@ -55,13 +55,15 @@ class Kernel:
 class Traits:
     """What probing finds: `matte` (T,) the value of terms that are constant, else NaN; who is `signed` (T,).
 
-    `turns` (T,): nothing changes when both directions turn around the normal, nor with the sense of turning;
-    `reciprocal` (T,): nor when both are exchanged. `alike`: which symmetries all terms have.
+    `turns` (T,): nothing changes when both directions turn around the normal; `even` (T,): nor when both are
+    mirrored in y; `reciprocal` (T,): nor when they are exchanged. `alike`: what symmetries terms have that
+    do not turn.
     """
 
     matte: F64
     signed: Bools
     turns: Bools
+    even: Bools
     alike: Symmetry
     reciprocal: Bools
 
@@ -112,18 +114,18 @@ def traits(kernel: Kernel) -> Traits:
 
     flip_x, flip_y = np.array([-1, 1, 1], np.float32), np.array([1, -1, 1], np.float32)
     along = same(at(a * flip_y, b * flip_y), plain)
-    turns = along & same(at(_turned(a, turn), _turned(b, turn[:, None])), plain)
-    across, half = turns, turns
+    turns = same(at(_turned(a, turn), _turned(b, turn[:, None])), plain)
+    alike = symmetry(True, True, True)
     if not turns.all():
         across = turns | same(at(a * flip_x, b * flip_x), plain)
-        half = (across & along) | same(at(a * (flip_x * flip_y), b * (flip_x * flip_y)), plain)
-    alike = symmetry(bool(across.all()), bool(along.all()), bool(half.all()))
+        half = turns | same(at(a * (flip_x * flip_y), b * (flip_x * flip_y)), plain)
+        alike = symmetry(bool(across.all()), bool((turns | along).all()), bool(half.all()))
     exchanged = b[:, :: LIT // 4]
     there = plain[:, :: LIT // 4]
     back = np.stack(
         [at(i, np.repeat(o[None, None], len(i), 0))[:, 0] for o, i in zip(a, exchanged, strict=True)]
     )
-    return Traits(matte, low < -1e-6 * largest, turns, alike, same(back, there))
+    return Traits(matte, low < -1e-6 * largest, turns, along, alike, same(back, there))
 
 
 @dataclass(frozen=True)
@@ -224,12 +226,18 @@ def _half_looks() -> tuple[tuple[float, float, _Look], ...]:
     return tuple(found)
 
 
-def ring_means(kernel: Kernel, terms: Sequence[int]) -> F64:
-    """(T, RINGS of wo, RINGS of wi, PARTS of turn between them) of terms that turn with the normal."""
+def ring_means(kernel: Kernel, terms: Sequence[int], even: bool = True) -> F64:
+    """(T, RINGS of wo, RINGS of wi, PARTS of turn between them) of terms that turn with the normal.
+
+    Of terms that are not `even`, such as noisy measurements, the mean of left and right.
+    """
     made = np.zeros((len(terms), RINGS, RINGS, PARTS))
     for row, (theta, weight, look) in enumerate(_half_looks()):
         wo = np.array([math.sin(theta), 0.0, math.cos(theta)], np.float32)
         values = kernel(wo, look.directions.T)
+        if not even:
+            other = kernel(wo, (look.directions * np.array([[1], [-1], [1]], np.float32)).T)
+            values = np.float32(0.5) * (values + other)
         for number, term in enumerate(terms):
             made[number, row // VIEWS] += weight * look.sums(values[:, term])
     half = made / (ring_measures() / (2 * PARTS))[:, None]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -14,8 +14,10 @@ from hypothesis import strategies as st
 from oracles.separable import cell_mean, dense_means, made, relative_error
 
 from studio_core.brdfs.albedo import quadrature_albedo
+from studio_core.brdfs.calls import evaluate
 from studio_core.params import defaults
 from studio_core.registry import PluginHost
+from studio_core.scene.geometry import Table
 from studio_core.scene.nodes import Material, Scene
 from studio_core.shading.artifacts import Shapes
 from studio_core.shading.materials import shapes
@@ -237,6 +239,37 @@ def test_a_picture_of_roughness_makes_few_kinds() -> None:
     width = [int(found.count[r]) for r in range(1, 121)]
     assert len(set(found.base.tolist())) <= 17
     assert max(width) <= 12
+
+
+def test_measured_tables_turn_with_the_normal_though_left_and_right_differ() -> None:
+    """As noisy measurements do: one ring of blocks, and the energy of both sides."""
+    table = Table(np.random.default_rng(3).uniform(0, 0.3, (12, 8, 16, 3)).astype(np.float32))
+    model = cast(Any, MODELS["measured"])
+    shape = model.shape_of(defaults(model.Params), {model.tables[0]: table})
+    where = np.array([model.address]), np.array([model.terms]), np.zeros(1, np.int64)
+    kept = Shapes(*where, np.append(shape, np.float32(0)), tables=(table,))
+    found = Separator()(kept, 0.1, 40)
+    known = traits(Kernel(model.address, model.terms, shape))
+    assert known.turns.all()
+    assert not known.even.any()
+    theta = (np.arange(RINGS) + 0.5) * np.pi / 2 / RINGS
+    for term in range(model.terms):
+        plain = reflected(made(found, 0, term, clamped=False)).reshape(RINGS, PARTS)
+        assert np.ptp(plain, axis=1).max() < 1e-5
+        for ring in (1, 8, 12):
+            wo = np.array([np.sin(theta[ring]), 0, np.cos(theta[ring])], np.float32)
+            true = cell_sum(model, shape, wo, term)
+            assert plain[ring, 0] == pytest.approx(true, rel=0.02)
+
+
+def cell_sum(brdf: Any, shape: np.ndarray, wo: np.ndarray, term: int) -> float:
+    """∫ b cos over the hemisphere by a fine regular grid."""
+    t, p = np.meshgrid(
+        (np.arange(180) + 0.5) * np.pi / 360, (np.arange(720) + 0.5) * np.pi / 360, indexing="ij"
+    )
+    wi = np.stack([np.sin(t) * np.cos(p), np.sin(t) * np.sin(p), np.cos(t)], -1).reshape(-1, 3)
+    weights = (np.sin(t) * np.cos(t)).ravel() * (np.pi / 360) ** 2
+    return float(weights @ evaluate(brdf, shape, wo, wi)[:, term].astype(np.float64))
 
 
 def test_captured_differences_may_be_below_nothing(host: PluginHost) -> None:
