@@ -35,11 +35,12 @@ def vertex_weights(
             made[own] = table
         else:
             texture = next(iter(resolved.textures.values()))
-            made[own] = _bilinear(table, texture.placed(mesh.uvs[own]))
+            made[own] = bilinear(table, texture.placed(mesh.uvs[own]))
     return made
 
 
-def _bilinear(table: npt.NDArray[np.float32], uv: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:
+def bilinear(table: npt.NDArray[np.float32], uv: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:
+    """(P, T, 3) of a table (H, W, T, 3), rows from v = 0 up, that repeats, at uv (P, 2)."""
     height, width = table.shape[:2]
     x, y = uv[:, 0] * width - 0.5, uv[:, 1] * height - 0.5
     x0, y0 = np.floor(x).astype(np.int64), np.floor(y).astype(np.int64)

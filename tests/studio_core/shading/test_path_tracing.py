@@ -14,6 +14,7 @@ from scenes import floor, sky
 
 from studio_core.contract import Services
 from studio_core.errors import Cancelled
+from studio_core.kernels.packets import OPAQUE
 from studio_core.parallel import Workers
 from studio_core.scene.geometry import Image, Texture
 from studio_core.scene.nodes import (
@@ -26,8 +27,12 @@ from studio_core.scene.nodes import (
     Scene,
     SpotLamp,
 )
+from studio_core.scene.shading_mesh import NO_BACK
 from studio_core.scene.transform import Transform, looking
+from studio_core.shading.artifacts import Hits
+from studio_core.shading.brute_force import lamp_layer
 from studio_core.shading.job import Job
+from studio_core.shading.materials import coefficients, resolve
 from studio_core.shading.path_tracing import (
     CONVERGED,
     PathCounts,
@@ -39,6 +44,10 @@ from studio_core.shading.path_tracing import (
     mean_layer,
 )
 from studio_core.shading.path_world import shown_gains
+from studio_core.shading.primary import visible_vertices
+from studio_core.shading.surface_points import surface_points, surface_uvs
+from studio_core.shading.varying import ShapeTable
+from studio_core.shading.vertex_radiance import bilinear
 
 GLOSSY = Material(id="paint", name="Paint", model="ggx", values={"roughness": 0.5, "metallic": 0.3})
 LIGHTS = {
@@ -279,6 +288,74 @@ def test_textures_are_read_where_paths_meet_them(services):
         own = found.surfaces.mesh.vertices_of(found.surfaces.mesh.index_of("floor"))
         made.append(traced(found, found.surfaces.mesh, 1024, 1).irradiance[own].mean(axis=0))
     np.testing.assert_allclose(made[0], made[1], rtol=0.04)
+
+
+def test_once_reflected_light_is_brute_force_seen_from_the_points(services, workers):
+    """Captured materials, with terms below 0 and maps of their own, and a picture of the roughness.
+
+    What one bounce brings to points is what brute force says of the places they see, looked at from there.
+    """
+    from studio.samples import sample
+    from studio_core.project.store import load
+
+    grey = np.linspace(0.3, 1.0, 64, dtype=np.float32).reshape(8, 8, 1)
+    rough = Material(
+        id="rough", model="ggx", values={"metallic": 1.0, "roughness": 0.7},
+        textures={"roughness": Texture(Image(grey, "data"), (0.7, 0.7))},
+    )  # fmt: skip
+    room = load(sample("captured-room")).scene
+    shown = [dataclasses.replace(node, hidden=True) for node in (*room.of(Environment), *room.of(PointLamp))]
+    lamp = PointLamp(id="one", intensity=8.0, transform=Transform((0.6, 1.8, 0.9)))
+    wall = MeshObject(
+        id="wall", geometry=floor(3.0), materials=("rough",), transform=Transform((0, 2.6, 0), (0, 1, 0, 0))
+    )
+    found = stand(room.with_materials(rough).with_nodes(*shown, lamp, wall), services, 3000)
+    mesh, rng = found.surfaces.mesh, np.random.default_rng(4)
+    assert found.world.shapes.row is not None
+    some = rng.choice(np.flatnonzero(visible_vertices(found.surfaces, found.hits)), 24, replace=False)
+    ours = traced(found, chosen_points(mesh, some), 4096, 1, shapes=found.shapes.of_points(some)).irradiance
+    theirs = np.array([_once(found, p, 1500, services, workers, rng) for p in some])
+    ratio = ours.astype(float).sum(axis=0) / theirs.sum(axis=0)
+    np.testing.assert_allclose(ratio, 1, atol=0.04)
+    assert np.sqrt(np.mean((ours - theirs) ** 2)) < 0.3 * theirs.mean()
+
+
+def _once(found, vertex, count, services, workers, rng):
+    """(3,) irradiance of a vertex by way of one surface, from the brute force of what it sees."""
+    mesh, caster = found.surfaces.mesh, found.casters.primary
+    n = mesh.normals[vertex].astype(float)
+    d = rng.normal(size=(count, 3))
+    d = n + d / np.linalg.norm(d, axis=1, keepdims=True)  # as the cosine
+    d /= np.linalg.norm(d, axis=1, keepdims=True)
+    place = mesh.positions[vertex] + mesh.origin
+    start = place + caster.epsilon * mesh.geometric[vertex] + mesh.inset[vertex]
+    hits = caster.closest(np.tile(start, (count, 1)), d, 0.0, np.inf, workers, mask=OPAQUE)
+    met = np.flatnonzero((hits.object >= 0) & (d @ mesh.geometric[vertex] > 0))
+    face = (mesh.face_offsets[hits.object] + hits.face)[met]
+    met, face = (a[hits.front[met] | (mesh.back_faces[face, 0] != NO_BACK)] for a in (met, face))
+    if not len(met):
+        return np.zeros(3)
+    seen = Hits(found.frame.view, 1, face.astype(np.int32), hits.u[met], hits.v[met], hits.t[met])
+    points, uvs = surface_points(found.surfaces, seen, start), surface_uvs(found.surfaces, seen, start)
+    table = ShapeTable(services.registry)
+    shapes = dataclasses.replace(
+        table.at(found.scene, found.surfaces.materials, points.material, uvs), tilt=None
+    )
+    lamp = found.lighting.lamps[0]
+    every = np.arange(len(met), dtype=np.int64)
+    terms = lamp_layer(points, shapes, caster, lamp, start, every, 1, workers, Job("direct")).terms
+    sent = np.zeros((len(met), 3))
+    for number, name in enumerate(found.surfaces.materials):
+        own = np.flatnonzero(points.material == number)
+        if not len(own):
+            continue
+        resolved = resolve(found.scene.material(name), services.registry)
+        looks = coefficients(resolved, shapes.width)
+        if looks.ndim == 4:
+            looks = bilinear(looks, next(iter(resolved.textures.values())).placed(uvs[own]))
+        sent[own] = (terms[own] * looks).sum(axis=1)
+    gain = shown_gains(found.scene)[lamp.node]
+    return np.pi * sent.sum(axis=0) * gain / count
 
 
 def test_what_is_see_through_is_passed_and_closed_insides_are_black(services):
