@@ -35,6 +35,8 @@ GRADE = 12.0
 CONSTANT = 1e-4  # of a term's largest value
 ALIKE = 1e-3  # two values of a kernel that are taken for the same
 ODD = 0.05  # share of probes that may differ: lobes at the edge of float32
+NEAREST = np.array([0, 1e-6, 1e-5, 1e-4, 1e-3], np.float32)
+"""How far from the mirror direction sharp lobes are looked for."""
 VIEWED, LIT = 16, 24  # directions that probing looks from and to
 
 
@@ -102,7 +104,10 @@ def traits(kernel: Kernel) -> Traits:
         return np.stack([kernel(o, i) for o, i in zip(wo, wi, strict=True)]).astype(np.float64)
 
     plain = at(a, b)
-    low, high = plain.min(axis=(0, 1)), plain.max(axis=(0, 1))
+    mirrored = a * np.array([-1, -1, 1], np.float32)
+    sharpest = at(a, mirrored[:, None] + NEAREST[:, None] * b[:, :1])  # lobes that all other probes miss
+    every = np.concatenate([plain, sharpest], axis=1)
+    low, high = every.min(axis=(0, 1)), every.max(axis=(0, 1))
     largest = np.maximum(np.abs(low), np.abs(high))
     constant = high - low <= CONSTANT * largest
     matte = np.where(constant, plain.mean(axis=(0, 1)), np.nan)

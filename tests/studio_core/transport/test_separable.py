@@ -211,6 +211,24 @@ def test_constants_have_no_functions_and_equal_shapes_share() -> None:
     assert found.incoming.dtype == found.outgoing.dtype == np.float32
 
 
+@pytest.mark.parametrize("name", [name for name in BUNDLED if name != "measured"])
+def test_the_sharpest_lobe_is_not_lost(name: str) -> None:
+    """At roughness 0, or the largest exponent, a blurred lobe returns about what a mirror does."""
+    sharp = {"roughness": 0.0, "exponent": 1e5, "sharpness_along": 1e5, "sharpness_across": 1e5}
+    own = {key: value for key, value in sharp.items() if key in defaults(MODELS[name].Params)}
+    found = SEPARATOR(rows((name, own)), 0.15, 12)
+    assert found.count[0] <= 12
+    assert np.isfinite(found.incoming).all()
+    assert np.isfinite(found.outgoing).all()
+    ring = 8
+    theta = (ring + 0.5) * np.pi / 2 / RINGS
+    wo = np.array([[np.sin(theta), 0, np.cos(theta)]], np.float32)
+    true = quadrature_albedo(MODELS[name], shape_of(name, **own), wo, 1e-4, 0.1)[0]
+    for term in range(MODELS[name].terms):
+        back = reflected(made(found, 0, term, clamped=False))[ring * PARTS]
+        assert back == pytest.approx(true[term], rel=0.05, abs=0.01)
+
+
 def test_only_what_changed_is_made_anew() -> None:
     separator = Separator()
     first = separator(rows(("phong", {"exponent": 20.0}), ("ggx", {})), 0.2, 20)
