@@ -21,16 +21,17 @@ import numpy.typing as npt
 from studio.bench import cuts_peers
 from studio.bench.harness import Report, Timing
 from studio.bench.interreflection_edits import EDITS
-from studio.bench.interreflection_measure import Editor, Step
+from studio.bench.interreflection_measure import Editor
 from studio.bench.interreflection_poses import poses
 from studio.bench.interreflection_scenes import CASES, Setting, setting
 from studio.bench.interreflection_truth import Light3, Places, Truth, TruthTracer
 from studio.headless import Headless
 from studio_core.contract import Services
 from studio_core.errors import PluginError
+from studio_core.kernels.visibility import lifted
 from studio_core.scene.nodes import Scene
 from studio_core.session import View
-from studio_core.shading.artifacts import Surfaces
+from studio_core.shading.artifacts import Casters, Surfaces
 from studio_core.shading.cache import DiskCache
 from studio_core.shading.offline import scene_view
 
@@ -114,10 +115,11 @@ def measure(
         return
     with tempfile.TemporaryDirectory(prefix="lucarne-bench-") as folder:
         suite = Case(report, program, case, one, method, setup, Path(folder))
+        suite.checked = peers and cuts_peers.installed()
         suite.first()
         suite.errors()
         suite.edits()
-        if peers and cuts_peers.installed():
+        if suite.checked:
             suite.peers()
 
 
@@ -140,7 +142,7 @@ class Case:
         self.view = self.seen(one.scene, (setup.width, setup.height))
         self.eye = np.asarray(self.view.transform.translation, np.float64)
         self.details: dict[str, Any] = report.details.setdefault(name, {})
-        self.last: Step | None = None
+        self.checked = False
 
     def seen(self, scene: Scene, size: tuple[int, int]) -> View:
         """What the scene's camera sees, one sample a pixel as while something moves."""
@@ -211,6 +213,8 @@ class Case:
             settled.append(step.between)
             made["rest"] = editor.light(places)
             truth = tracer(scene, self.eye, editor.pipeline, places)
+            if number == 0 and self.checked:
+                self._check(scene, editor, places, truth)
             tinted = np.array([name == self.one.tinted for name in surfaces.materials])
             walls = tinted[surfaces.mesh.material[places.rows]]
             for tier, light in made.items():
@@ -223,6 +227,21 @@ class Case:
         self.add("least_irradiance", least, "1")
         self.add("s_rest", float(np.median(settled)), "s", float(np.std(settled)))
         self.details["errors"] = {metric: [round(v, 5) for v in values] for metric, values in found.items()}
+
+    def _check(self, scene: Scene, editor: Editor, places: Places, truth: Truth) -> None:
+        """The truth itself against Mitsuba's paths, in one pose."""
+        from studio.bench.interreflection_peers import disagreement
+
+        surfaces, casters = editor.pipeline.artifact(Surfaces), editor.pipeline.artifact(Casters)
+        assert surfaces is not None
+        assert casters is not None
+        mesh, rows, caster = surfaces.mesh, places.rows, casters.primary
+        world = mesh.positions[rows] + mesh.origin
+        starts = lifted(caster, world, mesh.geometric[rows], mesh.inset[rows]) + caster.centre
+        off, noise = disagreement(
+            scene, self.program, starts, mesh.normals[rows], truth, BOUNCES, self.setup.paths
+        )
+        self.add("truth_irradiance_rel_rmse_vs_mitsuba", off, "1", noise)
 
     def edits(self) -> None:
         """Small steps of every kind in hand, each after the scene at rest."""

@@ -14,12 +14,14 @@ import numpy as np
 import numpy.typing as npt
 
 from studio.bench.cuts_peers import Peer, content, converged_half, lit_error
+from studio.bench.interreflection_truth import Truth
 from studio.headless import Headless
 from studio_core.folders import user_cache
 from studio_core.scene.nodes import Scene
 from studio_core.shading.cache import DiskCache
 
 F32 = npt.NDArray[np.float32]
+F64 = npt.NDArray[np.float64]
 METHOD = "Mitsuba, converged paths, 1"
 
 
@@ -57,3 +59,27 @@ def path_peer(
             seconds.append(min(taken, again))  # in Mitsuba's favour where others use the machine
             errors.append(lit_error(picture, *halves))
     return Peer(tuple(seconds), tuple(errors), (halves[0], halves[1]))
+
+
+def disagreement(
+    scene: Scene, program: Headless, origins: F64, normals: F32, truth: Truth, bounces: int, samples: int
+) -> tuple[float, float]:
+    """Relative RMSE of irradiance by way of surfaces against Mitsuba, without noise; and the noise of Mitsuba.
+
+    Both have two independent halves; (ours − theirs) of one times that of the other is the squared difference
+    alone. Rays start at origins (N, 3), where those of our own tracer do.
+    """
+    from studio_plugins.export.mitsuba_paths import indirect_irradiance
+
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        program.registry.get("exporter", "mitsuba").save(scene, folder, program.registry)
+        theirs = [
+            indirect_irradiance(str(folder), origins, normals, bounces, samples, offset=0.0, seed=seed).value
+            for seed in (1, 2)
+        ]
+    ours = [np.asarray(half.irradiance, np.float64) for half in (truth.first, truth.second)]
+    mean = float(np.mean(ours))
+    squared = float(np.mean((ours[0] - theirs[0]) * (ours[1] - theirs[1])))
+    noise = float(np.sqrt(np.mean((theirs[0] - theirs[1]) ** 2)) / 2)
+    return float(np.sqrt(max(squared, 0.0))) / mean, noise / mean
