@@ -64,7 +64,7 @@ def path_peer(
 def disagreement(
     scene: Scene, program: Headless, origins: F64, normals: F32, truth: Truth, bounces: int, samples: int
 ) -> tuple[float, float]:
-    """Relative RMSE of irradiance by way of surfaces against Mitsuba, without noise; and the noise of Mitsuba.
+    """Relative RMSE of irradiance by way of surfaces against Mitsuba, without noise; and its noise.
 
     Both have two independent halves; (ours − theirs) of one times that of the other is the squared difference
     alone. Rays start at origins (N, 3), where those of our own tracer do.
