@@ -24,9 +24,9 @@ from studio_plugins.interreflection.fields.body import Body
 
 I64 = npt.NDArray[np.int64]
 
-HOLLOW = 0.2
+HOLLOW = 0.3
 """Share of light that comes back to an object, from which on it is hollow."""
-PIECE = 0.03
+PIECE = 0.05
 """Of an object's surface, below which a piece belongs to the rest."""
 VERTICES, RAYS = 256, 16
 
