@@ -18,6 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from studio_core.shading.artifacts import Shapes
+from studio_core.shading.job import Job
 from studio_core.transport.cell_means import Kernel, Traits, cell_means, ring_means, ring_measures, traits
 from studio_core.transport.cells import CELLS, cell_projected_angles
 from studio_core.transport.factors import Directed, Spectrum, Turning
@@ -32,6 +33,8 @@ SPILL = 0.03
 LEAST_SOFTNESS, MOST_SOFTNESS, HALVINGS = 0.4, 8.0, 5
 KEPT = 64 << 20
 """Bytes of functions of shapes that are not in use any more."""
+TIERS = 3
+"""Tolerances whose last result is at hand."""
 STEPS = 16
 """Most different shapes of one material; those of a picture that has more are taken together."""
 
@@ -96,27 +99,34 @@ class Separator:
 
     def __init__(self) -> None:
         self._known: OrderedDict[tuple[_Key, object], _Products] = OrderedDict()
-        self._last: tuple[tuple[object, ...], Separated] | None = None
+        self._last: dict[object, tuple[tuple[_Key, ...], Separated]] = {}
         self.made = 0
 
-    def __call__(self, shapes: Shapes, tolerance: float = 0.15, most: int = 36) -> Separated:
+    def __call__(
+        self, shapes: Shapes, tolerance: float = 0.15, most: int = 36, job: Job | None = None
+    ) -> Separated:
         """So many products that the error is at most `tolerance`, but at most `most` a row.
 
-        The same object where nothing changed. `made` counts shapes that had to be taken apart.
+        The same object where nothing changed since one was last asked for with this tolerance. `made` counts
+        shapes that had to be taken apart; a cancelled `job` keeps those that were.
         """
-        return self._all(shapes, (float(tolerance), int(most)))
+        return self._all(shapes, (float(tolerance), int(most)), job)
 
     def fixed(self, shapes: Shapes, count: int) -> Separated:
         """`count` products a row: the plain truncated singular value decomposition, which rings."""
         return self._all(shapes, int(count))
 
-    def _all(self, shapes: Shapes, how: tuple[float, int] | int) -> Separated:
-        keys = _keys(shapes)
-        sign = (tuple(keys), how)
-        if self._last is not None and self._last[0] == sign:
-            return self._last[1]
-        found = {}
-        for key in dict.fromkeys(keys):
+    def _all(self, shapes: Shapes, how: tuple[float, int] | int, job: Job | None = None) -> Separated:
+        keys = tuple(_keys(shapes))
+        last = self._last.pop(how, None)
+        if last is not None and last[0] == keys:
+            self._last[how] = last
+            return last[1]
+        found: dict[_Key, _Products] = {}
+        different = list(dict.fromkeys(keys))
+        for number, key in enumerate(different):
+            if job is not None:
+                job.checkpoint(number, len(different))
             products = self._known.pop((key, how), None)
             if products is None:
                 products = _products(key, how)
@@ -124,7 +134,9 @@ class Separator:
             self._known[(key, how)] = found[key] = products
         self._forget(len(found))
         made = _laid_out(keys, found, shapes.width)
-        self._last = sign, made
+        while len(self._last) >= TIERS:
+            self._last.pop(next(iter(self._last)))
+        self._last[how] = keys, made
         return made
 
     def _forget(self, used: int) -> None:

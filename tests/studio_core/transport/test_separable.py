@@ -15,11 +15,13 @@ from oracles.separable import cell_mean, dense_means, made, relative_error
 
 from studio_core.brdfs.albedo import quadrature_albedo
 from studio_core.brdfs.calls import evaluate
+from studio_core.errors import Cancelled
 from studio_core.params import defaults
 from studio_core.registry import PluginHost
 from studio_core.scene.geometry import Table
 from studio_core.scene.nodes import Material, Scene
 from studio_core.shading.artifacts import Shapes
+from studio_core.shading.job import Job
 from studio_core.shading.materials import shapes
 from studio_core.transport.cell_means import Kernel, cell_means, traits
 from studio_core.transport.cells import CELLS, PARTS, RINGS, cell_projected_angles
@@ -238,6 +240,33 @@ def test_only_what_changed_is_made_anew() -> None:
     assert separator.made == 3
     separator(rows(("ggx", {}), ("phong", {"exponent": 20.0})), 0.2, 20)
     assert separator.made == 3
+
+
+def test_each_tolerance_has_its_last_result_at_hand() -> None:
+    separator, shape = Separator(), rows(("ggx", {}))
+    coarse, fine = separator(shape, 0.5, 8), separator(shape, 0.1, 36)
+    assert separator(shape, 0.5, 8) is coarse
+    assert separator(shape, 0.1, 36) is fine
+    assert separator.made == 2
+
+
+def test_what_a_cancelled_job_made_is_kept() -> None:
+    """The second of two shapes is never reached; asked again, the first is there."""
+
+    def stop(job: Job) -> None:
+        if job.done == 1:
+            job.cancel()
+
+    separator = Separator()
+    both = rows(("phong", {"exponent": 20.0}), ("ggx", {}), ("plastic", {}))
+    with pytest.raises(Cancelled):
+        separator(both, 0.2, 20, Job("apart", stop))
+    assert separator.made == 2
+    whole = separator(both, 0.2, 20, Job("apart"))
+    assert separator.made == 3
+    fresh = Separator()(both, 0.2, 20)
+    np.testing.assert_array_equal(whole.incoming, fresh.incoming)
+    np.testing.assert_array_equal(whole.outgoing, fresh.outgoing)
 
 
 def test_a_picture_of_roughness_makes_few_kinds() -> None:

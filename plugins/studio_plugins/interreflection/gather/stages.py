@@ -59,7 +59,7 @@ class SeparateStage:
     def run(self, frame: Frame, inputs: Inputs, job: Job) -> Separated:
         """The previous where neither shapes nor what is asked for differ."""
         tier = inputs[Chosen].tier
-        return self._separator(inputs[Shapes], tier.lobe_error, tier.functions)
+        return self._separator(inputs[Shapes], tier.lobe_error, tier.functions, job)
 
 
 @dataclass(frozen=True, eq=False)
