@@ -39,6 +39,8 @@ BINS = 8
 """Cosines of the view for which `Models.albedo` is known."""
 COSINE_SHARE = 0.05
 """Of paths, go on by the cosine where terms draw directions of their own."""
+LEAST_DENSITY = 1e-12
+"""Of a ray that is followed: what is rarer would be too bright for numbers."""
 INV_PI = 1 / np.pi
 NEXT, LAMP, SKY = 0, 1, 2  # the directions looked at from a surface
 
@@ -291,7 +293,7 @@ def light_paths(
                     reflected[SKY, c] * paths.throughput[n, c] / max(sky + mixed[SKY], 1e-30)
                 )
                 ray[LAMP, lane, c], ray[SKY, lane, c] = world[LAMP, c], world[SKY, c]
-            alive = mixed[NEXT] > 0.0 and not (last and lights.k == 0 and lights.areas == 0)
+            alive = mixed[NEXT] > LEAST_DENSITY and not (last and lights.k == 0 and lights.areas == 0)
             most = 0.0
             for c in range(3):
                 paths.throughput[n, c] *= reflected[NEXT, c] / max(mixed[NEXT], 1e-30)

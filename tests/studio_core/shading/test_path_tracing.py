@@ -6,6 +6,7 @@ import dataclasses
 
 import numpy as np
 import pytest
+from brdf_models import MODELS
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from oracles.paths import PathOracle
@@ -16,6 +17,7 @@ from studio_core.contract import Services
 from studio_core.errors import Cancelled
 from studio_core.kernels.packets import OPAQUE
 from studio_core.parallel import Workers
+from studio_core.params import param_infos
 from studio_core.scene.geometry import Image, Texture
 from studio_core.scene.nodes import (
     AreaLamp,
@@ -395,6 +397,44 @@ def test_far_from_the_origin_nothing_differs(services):
 
 def _shifted(transform, by):
     return dataclasses.replace(transform, translation=tuple(np.array(transform.translation) + by))
+
+
+@pytest.mark.parametrize("model", sorted(MODELS))
+def test_any_model_reflects_light_and_not_more_than_arrives(services, model):
+    """With its defaults and where its numbers are least and most: finite, hardly brighter than white paint."""
+    infos = param_infos(MODELS[model].Params)
+    numbers = {name: info for name, info in infos.items() if info.kind in ("number", "integer")}
+    white = Material(id="paint", name="P", values={"base_color": (1.0, 1.0, 1.0)})
+    limit = _bounced(services, white)
+    for extreme in (None, "low", "high"):
+        values = {} if extreme is None else {name: getattr(info, extreme) for name, info in numbers.items()}
+        light = _bounced(services, Material(id="paint", name="P", model=model, values=values))
+        assert np.isfinite(light.terms).all()
+        assert np.isfinite(light.irradiance).all()
+        assert light.irradiance.mean() < 1.6 * limit.irradiance.mean()
+
+
+def _bounced(services, paint):
+    found = stand(furnished((*LIGHTS["point"], *LIGHTS["sky"]), paint), services, 500)
+    return traced(found, found.surfaces.mesh, 64)
+
+
+def test_either_tracer_will_do(services, monkeypatch):
+    made = []
+    for tracer in ("auto", "bvh"):
+        monkeypatch.setenv("LUCARNE_RAYCASTER", tracer)
+        found = stand(furnished(LIGHTS["several"], GLOSSY), services, 500)
+        made.append((found.casters.primary.backend, traced(found, found.surfaces.mesh, 32).irradiance))
+    assert made[1][0] == "bvh"
+    apart = np.abs(made[0][1] - made[1][1]).max(axis=1) > 1e-3 * made[0][1].mean()
+    assert apart.mean() < 0.02  # rays along edges
+
+
+def test_where_nothing_stands_nothing_is_traced(services):
+    found = stand(Scene().with_nodes(*LIGHTS["several"]), services)
+    made = traced(found, found.surfaces.mesh, 16)
+    assert made.terms.shape == (0, made.terms.shape[1], 3)
+    assert not len(made.irradiance)
 
 
 def test_it_stops_when_asked(services, workers):
