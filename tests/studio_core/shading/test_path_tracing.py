@@ -401,7 +401,7 @@ def _shifted(transform, by):
 
 @pytest.mark.parametrize("model", sorted(MODELS))
 def test_any_model_reflects_light_and_not_more_than_arrives(services, model):
-    """With its defaults and where its numbers are least and most: finite, hardly brighter than white paint."""
+    """With its defaults and where its numbers are least and most: finite, no brighter than white paint."""
     infos = param_infos(MODELS[model].Params)
     numbers = {name: info for name, info in infos.items() if info.kind in ("number", "integer")}
     white = Material(id="paint", name="P", values={"base_color": (1.0, 1.0, 1.0)})
