@@ -2,7 +2,8 @@
 
 A vertex stands for a third of each face around it. There a picture is read by its mip level: as large as the
 third is, about its middle. So a pattern finer than the mesh counts with its mean, and nothing of the picture
-that lies beside the mesh's own part of it comes in. Of pictures only levels up to FINEST texels are kept.
+that lies beside the mesh's own part of it comes in. Of pictures only levels up to FINEST texels are kept; where
+coefficients bend with several of them, they are those of such levels.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ import numpy.typing as npt
 from studio_core.arrays import frozen_map
 from studio_core.contract import Services
 from studio_core.jit import kernel
+from studio_core.scene.geometry import Image
 from studio_core.scene.nodes import Material, MaterialId, Scene
 from studio_core.scene.shading_mesh import NO_BACK
 from studio_core.scene.world_mesh import WorldMesh
@@ -27,7 +29,7 @@ from studio_core.shading.coefficients import (
     picture_texels,
     uv_map_of,
 )
-from studio_core.shading.materials import Resolved, coefficients, resolve
+from studio_core.shading.materials import Resolved, coefficients, linear_rgb, resolve
 from studio_core.shading.pyramids import Pyramid
 
 F32 = npt.NDArray[np.float32]
@@ -118,6 +120,7 @@ class VertexCoefficients:
         self._registry = services.registry
         self._looks: dict[MaterialId, tuple[Material, _Look]] = {}
         self._pictures: dict[_PictureKey, _Picture] = {}
+        self._small: dict[str, Image] = {}
         self._mesh: tuple[object, ...] = ()
         self._own: dict[int, _Own] = {}
         self._made: tuple[tuple[_Look, ...], F32] | None = None
@@ -142,7 +145,7 @@ class VertexCoefficients:
         self.touched = np.ones(len(mesh), np.bool_)
         made = np.zeros((len(mesh), width), np.float32)
         old: tuple[_Look, ...] = ()
-        if before is not None and len(before[0]) == len(looks) and before[1][0].size == width:
+        if before is not None and len(before[0]) == len(looks) and 3 * before[1].shape[1] == width:
             made[:] = before[1].reshape(made.shape)
             old = before[0]
             self.touched[:] = False
@@ -172,6 +175,10 @@ class VertexCoefficients:
         looks = tuple(look for _, look in found.values())
         kept = {look.key for look in looks}
         self._pictures = {key: picture for key, picture in self._pictures.items() if key in kept}
+        if self._small:
+            every = (scene.material(name).textures.values() for name in materials)
+            used = {texture.image.key for textures in every for texture in textures}
+            self._small = {key: image for key, image in self._small.items() if key in used}
         return looks
 
     def _look(self, material: Material) -> _Look:
@@ -190,8 +197,21 @@ class VertexCoefficients:
             line = affine_line(resolved, picture.probe)
             if line is not None:
                 return _Look(line[0], line[1], picture, key, where)
-        own = _Picture.of(_flat(resolved))
+        own = _Picture.of(_flat(self._coarse(resolved)))
         return _Look(np.zeros(own.rows.shape[1], np.float32), None, own, key, where)
+
+    def _coarse(self, resolved: Resolved) -> Resolved:
+        """With pictures of at most FINEST texels a side: a slider asks the model for no more."""
+        textures = {}
+        for name, texture in resolved.textures.items():
+            image = texture.image
+            if max(image.pixels.shape[:2]) > FINEST:
+                if image.key not in self._small:
+                    height, width = (min(side, FINEST) for side in image.pixels.shape[:2])
+                    self._small[image.key] = Image(_resized(linear_rgb(image), height, width))
+                image = self._small[image.key]
+            textures[name] = dataclasses.replace(texture, image=image)
+        return dataclasses.replace(resolved, textures=textures)
 
     def _at(self, mesh: WorldMesh, look: _Look, own: _Own) -> F32:
         """Coefficients (P, T·3) at a material's vertices, or (T·3,) of all of them."""

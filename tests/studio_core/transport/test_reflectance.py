@@ -138,6 +138,31 @@ def test_every_kind_of_material(host: PluginHost, kind: str) -> None:
         np.testing.assert_allclose(found, np.broadcast_to(flat, found.shape), rtol=1e-4, atol=1e-6)
 
 
+def test_large_pictures_that_bend_are_asked_for_at_fewer_texels(host: PluginHost) -> None:
+    """Two pictures of 700 texels: means over the floor are those of all texels."""
+    rng = np.random.default_rng(2)
+    blocks = np.ones((20, 20, 1), np.float32)
+    colour = np.kron(rng.random((35, 35, 3)), blocks) + 0.05 * rng.normal(size=(700, 700, 3))
+    metal = np.kron(rng.random((35, 35, 1)), blocks)
+    textures = {
+        "base_color": Texture(Image(np.clip(colour, 0, 1).astype(np.float32))),
+        "metallic": Texture(Image(metal.astype(np.float32))),
+    }
+    look = Material(id="m", name="m", model="ggx", values={"metallic": 1.0}, textures=textures)
+    mesh = mesh_of(edge=0.04)
+    found = made(host, mesh, look)
+    whole = coefficients(resolve(look, host)).mean(axis=(0, 1))
+    np.testing.assert_allclose(np.average(found, weights=mesh.area, axis=0), whole, rtol=0.04, atol=1e-4)
+
+
+def test_nothing_shown(host: PluginHost) -> None:
+    look = painted(checkered(4, 64))
+    keeper, mesh = maker(host), assemble([])
+    for gain in (1.0, 0.5):
+        darker = dataclasses.replace(look, values=frozen_map({"base_color": (gain, gain, gain)}))
+        assert keeper(Scene().with_materials(darker), surfaces_of(mesh, darker)).shape == (0, 1, 3)
+
+
 def test_only_what_changed_is_made_anew(host: PluginHost) -> None:
     one, other = painted(checkered(4, 64), "a"), painted(checkered(8, 64), "b")
     mesh = assemble(
