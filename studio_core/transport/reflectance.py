@@ -2,8 +2,8 @@
 
 A vertex stands for a third of each face around it. There a picture is read by its mip level: as large as the
 third is, about its middle. So a pattern finer than the mesh counts with its mean, and nothing of the picture
-that lies beside the mesh's own part of it comes in. Of pictures only levels up to FINEST texels are kept; where
-coefficients bend with several of them, they are those of such levels.
+that lies beside the mesh's own part of it comes in. Of pictures only levels up to FINEST texels are kept, and
+coefficients that are no line in a picture's texels are those of such levels' texels.
 """
 
 from __future__ import annotations
