@@ -12,6 +12,7 @@ from studio_core.arrays import frozen_map
 from studio_core.contract import Services
 from studio_core.edits import Move
 from studio_core.scene.diff import Aspect, Changes, diff, view_changed
+from studio_core.scene.geometry import Geometry, Image, Texture
 from studio_core.scene.nodes import AreaLamp, Camera, Material, MeshObject, Scene
 from studio_core.scene.transform import Transform, axis_angle, looking
 from studio_core.shading.artifacts import (
@@ -189,3 +190,50 @@ def test_no_light_is_no_light(host, workers):
     made = Driven(host, workers, scene().with_nodes(lamp)).made
     assert not made.layer.terms.any()
     assert not made.layer.irradiance.any()
+
+
+@pytest.mark.parametrize("kind", ["nothing", "one", "glass", "degenerate", "far"])
+def test_odd_scenes(host, workers, kind):
+    first = scene()
+    sources = 3
+    match kind:
+        case "nothing":
+            first, sources = Scene().with_nodes(first["camera"], first["lamp"]), 0
+        case "one":
+            alone = (first[name] for name in ("camera", "lamp", "floor"))
+            first, sources = Scene().with_materials(first.material("white")).with_nodes(*alone), 1
+        case "glass":  # lets light pass, and receives it
+            first, sources = first.with_materials(Material(id="paint", name="Glass", opacity=0.2)), 2
+        case "degenerate":
+            flat = Geometry(np.zeros((3, 3), np.float32), np.array([[0, 1, 2]], np.uint32))
+            first = first.with_nodes(dataclasses.replace(first["cube"], id="flat", geometry=flat))
+        case "far":
+            away = Transform((1e4, 0, 2e3))
+            nodes = first.nodes.values()
+            first = first.with_nodes(*(dataclasses.replace(n, transform=away @ n.transform) for n in nodes))
+    made = Driven(host, workers, first).made
+    assert made.facts["sources"] == sources
+    assert np.isfinite(made.layer.terms).all()
+    assert (made.layer.terms >= 0).all()
+    if kind == "one":
+        assert not made.layer.terms.any()
+    if kind == "far":
+        near = Driven(host, workers, scene()).made
+        mean = made.layer.irradiance.mean(axis=0)
+        assert mean == pytest.approx(near.layer.irradiance.mean(axis=0), rel=0.02)
+
+
+def test_normal_maps_turn_light_as_the_truth_does(host, workers):
+    x = np.tile(0.4 * np.cos(2 * np.pi * np.arange(32) / 8), (32, 1))
+    normals = np.stack([-x, 0 * x, np.ones_like(x)], axis=2)
+    normals /= np.linalg.norm(normals, axis=2, keepdims=True)
+    texture = Texture(Image(((normals + 1) / 2).astype(np.float32), "data"))
+    bumpy = dataclasses.replace(scene().material("white"), textures=frozen_map({"normal": texture}))
+    driven = Driven(host, workers, scene().with_materials(bumpy))
+    tilts = driven.made.layer.tilts
+    points = np.flatnonzero(driven.made.valid)[::3]
+    truth = driven.truth(points, 256).tilts
+    assert tilts is not None
+    for field in range(3):
+        mine, true = tilts[points][:, field, 0].ravel(), truth[:, field, 0].ravel()
+        assert np.corrcoef(mine, true)[0, 1] > 0.9
