@@ -33,9 +33,12 @@ from studio_core.shading.indirect import IndirectStage, unrefined_seen, with_ind
 from studio_core.shading.job import Job
 from studio_core.shading.offline import backend_params
 from studio_core.shading.pipeline import Pipeline
+from studio_core.transport.operator import Transport
+from studio_core.transport.patterns import cosine_pattern
 
 F32 = npt.NDArray[np.float32]
 I64 = npt.NDArray[np.int64]
+PROBES = 32
 OWNERS = ("studio_core", "studio_plugins")
 BETWEEN = ("IndirectStage", "CombineStage")
 """Stages that are there for light between surfaces alone."""
@@ -105,6 +108,17 @@ class Editor:
         assert hits is not None
         origins = None if surfaces.tree is None else surfaces.tree.origins
         return np.flatnonzero(unrefined_seen(surfaces, hits, origins))
+
+    def free(self, rows: I64) -> I64:
+        """Those of some vertices on which nothing stands: half of their rays, or more, meet no inside."""
+        surfaces, casters = self.pipeline.artifact(Surfaces), self.pipeline.artifact(Casters)
+        assert surfaces is not None
+        assert casters is not None
+        kept = Transport(self.services.workers, cosine_pattern(PROBES, seed=77))
+        wanted = np.zeros(len(surfaces.unrefined.mesh), np.bool_)
+        wanted[rows] = True
+        kept.update(surfaces, casters, wanted, None)
+        return rows[kept.share_back[kept.row_of[rows]] < 0.5]
 
     def light(self, places: Places) -> Light3:
         """What was made there for the last frame; for pipelines that refine nothing."""
