@@ -136,8 +136,8 @@ class BounceStage:
             params.bands,
             {"fields_made": self._store.made - before, "rays": traced.rays},
             {
-                "components": float(params.components),
-                "functions": float(params.functions),
+                "N": float(params.components),
+                "K": float(params.functions),
                 "shells": float(params.shells),
                 "places": float(sum(len(one.lattice) for one in kept)),
                 "sources": float(len(fields)),

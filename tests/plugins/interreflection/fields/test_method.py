@@ -176,7 +176,7 @@ def test_glossy_sources_and_receivers(host, workers):
     made = glossy.made
     mesh = made.surfaces.mesh
     own = np.flatnonzero(made.valid & (mesh.object == 2))
-    assert made.facts["functions"] == 16
+    assert made.facts["K"] == 16
     assert (made.layer.terms >= 0).all()
     assert np.isfinite(made.layer.terms).all()
     truth = glossy.truth(own)
