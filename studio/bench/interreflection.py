@@ -48,6 +48,8 @@ PARTS = (
 )
 """Modules with further cases: each has `run(report, program, setup)`."""
 BOUNCES = 3
+STILL = 4
+"""Samples across and up a pixel of pictures at rest."""
 MOST = 0.98
 """Share of the places that are left where the worst are left out."""
 SURER = 8
@@ -80,7 +82,7 @@ QUICK = Setup(
     height=135,
     poses=2,
     places=120,
-    paths=64,
+    paths=256,
     edits=3,
     peer=(120, 68),
     samples=(4, 16),
@@ -280,7 +282,8 @@ class Case:
         scene = EDITS["light"](self.one, 3)[0]
         step, picture = editor.go(scene, True)
         peer = path_peer(scene, self.program, setup.peer, BOUNCES, setup.samples, setup.converged)
-        rest, exact = self.editor("peers", refine=True, view=view).go(scene, False)
+        still = dataclasses.replace(view, antialias=STILL)
+        rest, exact = self.editor("peers", refine=True, view=still).go(scene, False)
         for metric, one, made in (("", step, picture), ("_first", rest, exact)):
             error = peer.error(made.linear)
             self.add(f"peer{metric}_picture_rel_rmse", error, "1", peer.noise)
