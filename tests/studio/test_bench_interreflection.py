@@ -14,13 +14,14 @@ from bouncing import BouncingHost
 
 from studio.bench import interreflection
 from studio.bench.harness import Report
-from studio.bench.interreflection import Setup, errors_of, measure
+from studio.bench.interreflection import Setup, errors_of, measure, red_to_green
 from studio.bench.interreflection_edits import EDITS
 from studio.bench.interreflection_furnace import over_kept_rays
+from studio.bench.interreflection_measure import Editor
 from studio.bench.interreflection_meshes import box, shell
 from studio.bench.interreflection_operator import Stand, kept_rays, products, source_light
 from studio.bench.interreflection_scenes import Setting, bleeding, furnace, pot_on_floor
-from studio.bench.interreflection_truth import Light3, Truth, scene_key
+from studio.bench.interreflection_truth import Light3, Places, Truth, scene_key
 from studio.headless import Headless
 from studio_core.contract import Services
 from studio_core.params import param
@@ -37,6 +38,7 @@ from studio_core.shading.artifacts import (
     Surfaces,
 )
 from studio_core.shading.brute_force import blank_layer
+from studio_core.shading.offline import scene_view
 from studio_core.shading.path_tracing import PathSettings, chosen_points, indirect_layer
 from studio_core.shading.path_world import PathWorlds
 
@@ -242,6 +244,31 @@ def test_closed_rooms_of_one_albedo_are_as_bright_as_they_must_be(program: Headl
     assert partial < 1e-5
     leaky, _ = over_kept_rays(furnace(0.8, curved), program, 0.7)
     assert leaky == pytest.approx(0.3 / 0.2 - 1, rel=1e-3), "and it is seen where they are not"
+    program.close()
+
+
+def test_a_red_box_tints_what_is_beside_it_wherever_it_stands(program: Headless) -> None:
+    start = little_room()
+    view = dataclasses.replace(scene_view(start.scene, None, 96, 54), antialias=1)
+    backend = program.registry.get("backend", "cuts")
+    values = {"vertices": start.budget, "refine": False}
+    editor = Editor(backend, program.services, "too-bright", view, values, {"wrong": 0.0})
+    tints = []
+    for x in (-0.5, 0.5):
+        box_there = dataclasses.replace(start.scene["cabinet"], transform=Transform((x, 0.0, -0.3)))
+        scene = start.scene.with_nodes(box_there)
+        editor.go(scene, False)
+        surfaces = editor.pipeline.artifact(Surfaces)
+        assert surfaces is not None
+        mesh, seen = surfaces.mesh, editor.seen()
+        at = mesh.positions[seen] + mesh.origin
+        wall = seen[(at[:, 2] < -0.99) & (at[:, 1] < 1.0) & (at[:, 1] > 0.1) & (np.abs(at[:, 0]) < 0.9)]
+        light = editor.light(Places.of(scene, surfaces, wall, program.services))
+        left = (mesh.positions[wall] + mesh.origin)[:, 0] < -0.1
+        right = (mesh.positions[wall] + mesh.origin)[:, 0] > 0.1
+        tints.append(red_to_green(light.all[left]).max() / red_to_green(light.all[right]).max())
+    assert tints[0] > 1.03
+    assert tints[1] < 1 / 1.03
     program.close()
 
 
