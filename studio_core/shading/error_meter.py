@@ -45,6 +45,8 @@ LAMP_SAMPLES = 256
 RESAMPLINGS = 200
 PATHS = 1024
 """Paths a place, where light between surfaces is measured."""
+SEEDS = 1_000_003
+"""Where the numbers of these begin: far from those of path traced light that is shown."""
 
 
 def compare(
@@ -190,7 +192,7 @@ class ErrorMeter:
     ) -> tuple[LayerRadiance, LayerRadiance]:
         """Light that came by way of other surfaces, twice, on surfaces that face as `facing` does."""
         eye = np.asarray(frame.view.transform.translation, np.float64)
-        settings = PathSettings(bounces_of(frame), PATHS, frame.revision)
+        settings = PathSettings(bounces_of(frame), PATHS, SEEDS + frame.revision)
         plain = dataclasses.replace(shapes, tilt=None)
         return indirect_halves(points, plain, eye, world, settings, self._workers, job, facing)
 
