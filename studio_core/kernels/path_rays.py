@@ -24,7 +24,7 @@ from studio_core.kernels.packets import (
     clear_hits,
     new_packet,
 )
-from studio_core.kernels.path_state import AREA, ENDED, I64, Lights, Mesh, Paths, Tracer, area_weight
+from studio_core.kernels.path_state import AREA, ENDED, I64, Lights, Mesh, Paths, Tracer, area_weight, scrambled
 
 NO_BACK = np.uint32(0xFFFFFFFF)
 LEAST_SHARE = 1e-4
@@ -152,6 +152,8 @@ def follow_paths(
             for c in range(2):
                 paths.uv[n, c] = w0 * mesh.uvs[i, c] + w1 * mesh.uvs[j, c] + w2 * mesh.uvs[k, c]
             paths.material[n] = paths.row[n] = mesh.material[i]
+            chance = np.float64(scrambled(paths.random[n]) >> np.uint64(11)) * 2.0**-53
+            paths.vertex[n] = i if chance < w0 else (j if chance < w0 + w1 else k)
 
 
 @kernel

@@ -32,6 +32,7 @@ class Paths(NamedTuple):
     steradian with which the ray was drawn; random (N,) states; lamps (N,): the sum of what lamps would give
     where the ray starts, by which one was chosen. Where the ray meets a surface: normal, geometric (N, 3),
     tangent (N, 4), uv (N, 2), material and row (N,) of its BRDF; a path with the material `ENDED` is over.
+    vertex (N,) is a corner of the face, chosen as often as its barycentric weight says.
     """
 
     origin: F32
@@ -47,6 +48,7 @@ class Paths(NamedTuple):
     uv: F32
     material: I32
     row: I32
+    vertex: I32
 
     @classmethod
     def of(cls, count: int) -> Paths:
@@ -65,6 +67,7 @@ class Paths(NamedTuple):
             uv=np.zeros((count, 2), np.float32),
             material=np.full(count, ENDED, np.int32),
             row=np.zeros(count, np.int32),
+            vertex=np.zeros(count, np.int32),
         )
 
 

@@ -200,9 +200,13 @@ def received(
 
 @dataclass(frozen=True, eq=False)
 class Sources:
-    """What all vertices send after some bounces; `left` is the last step's change over all, relative."""
+    """What all vertices send after some bounces, and what they did with one bounce less (None: nothing).
+
+    `left` is the last step's change over all, relative.
+    """
 
     light: Light
+    before: Light | None
     steps: int
     left: float = 0.0
 
@@ -224,10 +228,10 @@ def bounced(
         return straight + reflected(received(sent, tables, surface, workers, job), surface, workers, job)
 
     if bounces is not None:
-        sent = straight
+        sent, before = straight, None
         for _ in range(bounces - 1):
-            sent = step(sent)
-        return Sources(sent, bounces - 1)
+            sent, before = step(sent), sent
+        return Sources(sent, before, bounces - 1)
     return _settled(straight, step)
 
 
@@ -249,11 +253,12 @@ def _settled(straight: Light, step: _Step) -> Sources:
         size = max(size, float(np.abs(after[:count]).max(initial=0)))
         left = float(np.abs(change[:count]).max(initial=0)) / size
         if left < SETTLED:
-            return Sources(following, number, left)
+            return Sources(following, following, number, left)
         changes, results = [*changes, change][-HISTORY:], [*results, after][-HISTORY:]
         mixed = _mixed(changes, results)
         sent = Light(mixed[:count].reshape(sent.matte.shape), mixed[count:].reshape(sent.functions.shape))
-    return Sources(step(sent), MOST_STEPS + 1, left)
+    last = step(sent)
+    return Sources(last, last, MOST_STEPS + 1, left)
 
 
 def _flat(light: Light) -> F32:
