@@ -79,6 +79,8 @@ def _follow(
     first: int,
     count: int,
     which: I64,
+    receiver: I64,
+    geometric: F32,
     stream: I64,
     axes: F64,
     origin: F64,
@@ -100,7 +102,10 @@ def _follow(
     distance: U16,
     touched: npt.NDArray[np.bool_],
 ) -> int:
-    """Traces the marked rays and writes what they meet; how many."""
+    """Traces the marked rays and writes what they meet; how many.
+
+    A ray that a shading normal lets leave into the surface itself meets nothing.
+    """
     rays = directions.shape[1]
     row_of, ray_of, met = np.empty(8, np.int64), np.empty(8, np.int64), np.empty(8, np.int64)
     along = np.empty((8, 3))
@@ -114,19 +119,20 @@ def _follow(
                 row = which[first + column]
                 p = variant[row]
                 x, y, z = directions[p, ray, 0], directions[p, ray, 1], directions[p, ray, 2]
-                size = 0.0
+                size, clear = 0.0, 0.0
                 for axis in range(3):
                     along[used, axis] = (
                         axes[column, 0, axis] * x + axes[column, 1, axis] * y + axes[column, 2, axis] * z
                     )
                     size += abs(along[used, axis])
+                    clear += along[used, axis] * geometric[receiver[row], axis]
                     packet[ORIGIN + axis, used] = origin[column, axis] + shift[axis]
                     packet[DIRECTION + axis, used] = along[used, axis]
                 packet[TFAR, used] = np.inf
-                valid[used] = -1 if 0.0 < size < np.inf else 0
+                valid[used] = -1 if 0.0 < size < np.inf and clear > 0.0 else 0
                 row_of[used], ray_of[used] = row, ray
                 used += 1
-                traced += 1
+                traced += 1 if valid[used - 1] != 0 else 0
             if used == 8 or (last and used > 0):
                 for lane in range(used, 8):
                     valid[lane] = 0
@@ -323,6 +329,8 @@ def update_rows(
         start,
         count,
         which,
+        receiver,
+        geometric,
         stream,
         axes,
         origin,

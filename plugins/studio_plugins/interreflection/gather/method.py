@@ -8,7 +8,15 @@ from typing import Any
 
 from studio_core.contract import Services
 from studio_core.params import param
-from studio_plugins.interreflection.gather.stages import stages
+from studio_plugins.interreflection.gather.final_stage import FinalStage
+from studio_plugins.interreflection.gather.smooth import Neighbours
+from studio_plugins.interreflection.gather.stages import (
+    MeetingsStage,
+    ReflectingStage,
+    SentStage,
+    SeparateStage,
+)
+from studio_plugins.interreflection.gather.tiers import TierStage
 
 
 @dataclass(frozen=True)
@@ -37,7 +45,15 @@ class Gather:
 
     def stages(self, services: Services) -> Sequence[Any]:
         """Fresh stages, the last gives Indirect."""
-        return stages(services)
+        neighbours = Neighbours()
+        return [
+            TierStage(),
+            SeparateStage(),
+            ReflectingStage(services),
+            MeetingsStage(services),
+            SentStage(services, neighbours),
+            FinalStage(services, neighbours),
+        ]
 
 
 METHOD = Gather()

@@ -14,6 +14,7 @@ mean (as James & Stein 1961 shrink means).
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -32,7 +33,7 @@ from studio_core.shading.job import Job
 from studio_core.shading.path_world import PathWorld
 from studio_core.transport.bounces import Light, Sources, Surface
 from studio_core.transport.cells import cell_of
-from studio_core.transport.hits import BLACK
+from studio_core.transport.hits import BLACK, NOTHING
 from studio_core.transport.operator import Transport
 
 F32 = npt.NDArray[np.float32]
@@ -42,7 +43,9 @@ I64 = npt.NDArray[np.int64]
 U16 = npt.NDArray[np.uint16]
 U32 = npt.NDArray[np.uint32]
 
-NEAR = 3.0  # rays shorter than so many times the distance of vertices are followed on
+NEAR, NEAR_SHARP = 3.0, 10.0
+"""Rays shorter than so many times the distance of vertices are followed on; to sharp lobes, longer ones."""
+SHARP = 0.3  # error of separated lobes
 AT_ONCE = 1 << 17  # paths
 CHUNK = 1 << 11
 ZERO = np.float32(0.0)
@@ -56,12 +59,24 @@ class Near:
     ray: I64
     change: F32
 
+    def numbered(self, table: Transport) -> U32:
+        """(R, N) which of these a ray of the table is; NOTHING: none."""
+        made = np.full(table.table.vertex.shape, NOTHING, np.uint32)
+        made[self.row, self.ray] = np.arange(len(self.row), dtype=np.uint32)
+        return made
 
-def near_rays(table: Transport, which: I64, spacing: F32) -> tuple[I64, I64]:
-    """Rows and rays of rows `which` that end closer than `NEAR` times the spacing (V,) of what they meet."""
+
+def near_rays(table: Transport, which: I64, area: F32, row: I32, error: F32) -> tuple[I64, I64]:
+    """Rows and rays of rows `which` (C,) that are to be followed on.
+
+    area (V,) is what each vertex stands for, row (V,) that of its BRDF, and error (R,) how wrong that is as
+    products.
+    """
+    sharp = np.append(error, np.float32(0))[row] > SHARP
+    reach = np.where(sharp, np.float32(NEAR_SHARP), np.float32(NEAR)) * np.sqrt(2 * area)
     vertex = table.table.vertex[which]
     met = vertex < BLACK
-    limit = np.float32(NEAR) * spacing[np.where(met, vertex, 0)]
+    limit = reach[np.where(met, vertex, 0)]
     found = met & (table.table.distance[which].astype(np.float32) < limit)
     place, ray = np.nonzero(found)
     return which[place], ray.astype(np.int64)
@@ -91,42 +106,42 @@ def followed(
     dark = Light(np.zeros_like(sources.light.matte), np.zeros_like(sources.light.functions))
     beyond, known = sources.before or dark, surface.separated
     tables = (surface.slot, surface.row, known.base, known.count, known.outgoing)
-    for sample in range(samples):
-        for first in range(0, len(rows), AT_ONCE):
-            job.checkpoint(first, len(rows))
-            part = slice(first, min(first + AT_ONCE, len(rows)))
-            count = part.stop - part.start
-            paths = Paths.of(count)
-            given = (table.rows, table.variant, table.pattern.directions, mesh.normals, mesh.tangents)
+    pattern = (table.rows, table.variant, table.pattern.directions, mesh.normals, mesh.tangents)
+    frames, hits = (mesh.normals, mesh.tangents), table.table
 
-            def begin(start: int, stop: int, part: slice = part, paths: Paths = paths, s: int = sample) -> None:
-                begin_near(start, stop, seed + s, rows[part], rays[part], *given, origin_of, paths)
+    def along(part: slice, number: int) -> F32:
+        paths = Paths.of(part.stop - part.start)
 
-            workers.run(count, CHUNK, begin, job)
-            every = np.arange(count)
-            _follow(every, False, world, paths, workers, job)
-            active = np.flatnonzero(paths.material >= 0)
-            _light(active, world, paths, workers, job)
-            active = active[paths.material[active] >= 0]
-            _follow(active, True, world, paths, workers, job)
-            active = active[paths.material[active] >= 0]
-            if sources.before is not None:
+        def begin(start: int, stop: int) -> None:
+            begin_near(start, stop, number, rows[part], rays[part], *pattern, origin_of, paths)
 
-                def end(start: int, stop: int, active: I64 = active, paths: Paths = paths) -> None:
-                    end_near(
-                        start, stop, active, mesh.normals, mesh.tangents, beyond.matte, *tables, beyond.functions, paths
-                    )
+        def end(start: int, stop: int) -> None:
+            sent: Any = (beyond.matte, *tables, beyond.functions)
+            end_near(start, stop, active, *frames, *sent, paths)
 
-                workers.run(len(active), CHUNK, end, job)
-            caster.count(count + len(active))
-            change[part] += paths.radiance / np.float32(samples)
-    hits = table.table
+        workers.run(len(paths.material), CHUNK, begin, job)
+        active = np.arange(len(paths.material))
+        _follow(active, False, world, paths, workers, job)
+        active = active[paths.material >= 0]
+        _light(active, world, paths, workers, job)
+        active = active[paths.material[active] >= 0]
+        caster.count(len(paths.material) + len(active))
+        _follow(active, True, world, paths, workers, job)
+        active = active[paths.material[active] >= 0]
+        if sources.before is not None:
+            workers.run(len(active), CHUNK, end, job)
+        return paths.radiance
 
     def differ(start: int, stop: int) -> None:
-        subtract_sent(
-            start, stop, rows, rays, hits.vertex, hits.cell, sources.light.matte, *tables, sources.light.functions, change
-        )
+        told = (sources.light.matte, *tables, sources.light.functions)
+        every: Any = (hits.vertex, hits.cell, *told, change)
+        subtract_sent(start, stop, rows, rays, *every)
 
+    for first in range(0, len(rows), AT_ONCE):
+        part = slice(first, min(first + AT_ONCE, len(rows)))
+        for sample in range(samples):
+            job.checkpoint(first * samples, len(rows) * samples)
+            change[part] += along(part, seed + sample) / np.float32(samples)
     workers.run(len(rows), CHUNK, differ, job)
     return Near(rows, rays, change)
 
@@ -267,11 +282,15 @@ def subtract_sent(
         out[n, 2] -= b
 
 
-def trusted(near: Near, rows: int, rays: int) -> F32:
-    """(R,) how much of each row's mean δ is more than its noise: 1 − s² / m², at least 0."""
-    light = near.change.mean(axis=1).astype(np.float64)
-    total = np.bincount(near.row, light, rows) / rays
-    squares = np.bincount(near.row, light**2, rows) / rays
+def trusted(found: Sequence[tuple[Transport, Near]], vertices: int) -> F32:
+    """(V,) how much of each receiver's mean δ is more than its noise: 1 − s² / m², at least 0."""
+    rays = sum(table.table.rays for table, _ in found)
+    total, squares = np.zeros(vertices), np.zeros(vertices)
+    for table, near in found:
+        light = near.change.mean(axis=1, dtype=np.float64)
+        receiver = table.rows[near.row]
+        total += np.bincount(receiver, light, vertices) / rays
+        squares += np.bincount(receiver, light**2, vertices) / rays
     noise = np.maximum(squares - total**2, 0) / rays
     with np.errstate(divide="ignore", invalid="ignore"):
         share = 1 - noise / total**2

@@ -13,19 +13,14 @@ from studio_core.scene.diff import Aspect
 from studio_core.scene.nodes import Light as LightNode
 from studio_core.shading.artifacts import (
     Casters,
-    Indirect,
-    LayerRadiance,
     Lighting,
-    Receivers,
     Shapes,
     Surfaces,
 )
-from studio_core.shading.brute_force import blank_layer
 from studio_core.shading.frame import Frame
 from studio_core.shading.job import Job
 from studio_core.shading.kept import Kept
 from studio_core.shading.pipeline import Inputs
-from studio_core.shading.tilting import facings, gather_tilts
 from studio_core.transport.bounces import Covered, Light, Sources, Surface, bounced, reflected
 from studio_core.transport.light_samples import SampleCounts
 from studio_core.transport.operator import Transport
@@ -33,10 +28,8 @@ from studio_core.transport.patterns import cosine_pattern
 from studio_core.transport.reflectance import VertexCoefficients
 from studio_core.transport.separable import Separated, Separator
 from studio_core.transport.source_light import SourceLight
-from studio_plugins.interreflection.gather.final import add_flat_terms, gather_final
-from studio_plugins.interreflection.gather.lobe_rays import LobeRays
-from studio_plugins.interreflection.gather.smooth import Neighbours, Spacing, smoothed
-from studio_plugins.interreflection.gather.tiers import Chosen, Tier, TierStage
+from studio_plugins.interreflection.gather.smooth import Neighbours
+from studio_plugins.interreflection.gather.tiers import Chosen
 
 F32 = npt.NDArray[np.float32]
 I64 = npt.NDArray[np.int64]
@@ -104,7 +97,7 @@ class MeetingsStage:
 
     def __init__(self, services: Services) -> None:
         self._workers = services.workers
-        self._tables = _Tables(services, INNER_SEED)
+        self._tables = Tables(services, INNER_SEED)
 
     def run(self, frame: Frame, inputs: Inputs, job: Job) -> Meetings:
         """Tables brought up to date."""
@@ -113,7 +106,7 @@ class MeetingsStage:
         return self._tables(inputs[Chosen].tier.inner, surfaces, inputs[Casters], every, inputs.previous, job)
 
 
-class _Tables:
+class Tables:
     """One `Transport` for each number of rays, of independent patterns."""
 
     def __init__(self, services: Services, seed: int) -> None:
@@ -208,142 +201,6 @@ class SentStage:
         return Sent(made, surface, counted.rays, nbytes)
 
 
-class FinalStage:
-    """What receivers get of all that is sent."""
-
-    needs: tuple[type, ...] = (
-        Surfaces,
-        Casters,
-        Shapes,
-        Receivers,
-        Chosen,
-        Separated,
-        Meetings,
-        Sent,
-    )
-    gives = Indirect
-    dirtied_by = Aspect.VIEW
-
-    def __init__(self, services: Services, neighbours: Neighbours) -> None:
-        self._workers = services.workers
-        self._tables = _Tables(services, FINAL_SEED)
-        self._lobes = LobeRays(services)
-        self._neighbours = neighbours
-        self._spacing: Kept[Spacing] = Kept()
-        self._meetings: Meetings | None = None
-
-    def run(self, frame: Frame, inputs: Inputs, job: Job) -> Indirect:
-        """The layer at the receivers."""
-        surfaces, shapes, receivers = inputs[Surfaces], inputs[Shapes], inputs[Receivers]
-        mesh, sent, chosen = surfaces.mesh, inputs[Sent], inputs[Chosen]
-        wanted, casters = receivers.seen, inputs[Casters]
-        met = self._tables(chosen.tier.final, surfaces, casters, wanted, self._meetings, job)
-        traced = 0 if met is self._meetings else met.rays
-        self._meetings = met
-        lobes = self._lobes.update(frame.scene, surfaces, casters, shapes, receivers, chosen.tier.lobes, job)
-        layer = blank_layer(mesh, shapes)
-        cosine_rays = sum(chosen.tier.final)
-        spacing = self._spacing(lambda: Spacing.of(met.tables[0], self._workers, job), met)
-        neighbours = self._neighbours(mesh)
-        eye = (receivers.eye - mesh.origin).astype(np.float32)
-        row, separated = shapes.rows(mesh), inputs[Separated]
-        vertices = np.flatnonzero(wanted)
-        ways = facings(mesh, shapes, layer)
-        for way in ways:
-            needed = vertices if way.leaning is None else vertices[way.leaning[vertices]]
-            for table, pattern, world in (
-                *((t, t.pattern.directions, _NO_RAYS) for t in met.tables),
-                *(((lobes.transport, _NO_RAYS, lobes.directions),) if lobes.transport is not None else ()),
-            ):
-                hits = table.table
-                which = table.row_of[needed].astype(np.int64)
-                which = which[which >= 0]
-
-                def run(
-                    start: int,
-                    stop: int,
-                    which: I64 = which,
-                    table: Any = table,
-                    hits: Any = hits,
-                    pattern: F32 = pattern,
-                    world: F32 = world,
-                    way: Any = way,
-                ) -> None:
-                    gather_final(
-                        start,
-                        stop,
-                        float(cosine_rays),
-                        lobes.count,
-                        which,
-                        table.rows,
-                        table.variant,
-                        hits.vertex,
-                        hits.cell,
-                        pattern,
-                        world,
-                        mesh.positions,
-                        mesh.normals,
-                        mesh.tangents,
-                        way.mesh.normals,
-                        way.mesh.tangents,
-                        row,
-                        eye,
-                        shapes.address,
-                        shapes.terms,
-                        shapes.offset,
-                        shapes.data,
-                        lobes.lobes.density,
-                        lobes.lobes.peaked,
-                        separated.matte,
-                        sent.sources.light.matte,
-                        sent.surface.slot,
-                        separated.base,
-                        separated.count,
-                        separated.outgoing,
-                        sent.sources.light.functions,
-                        way.terms,
-                        way.irradiance,
-                    )
-
-                self._workers.run(len(which), CHUNK, run, job)
-            mask = np.zeros(len(wanted), np.bool_)
-            mask[needed] = True
-            given = (way.irradiance, met.tables[0], mask, spacing, mesh, neighbours, cosine_rays)
-            way.irradiance[:] = smoothed(*given, self._workers, job)
-
-            def flat(start: int, stop: int, needed: I64 = needed, way: Any = way) -> None:
-                add_flat_terms(start, stop, needed, row, separated.matte, way.irradiance, way.terms)
-
-            self._workers.run(len(needed), CHUNK, flat, job)
-        if layer.tilts is not None:
-            gather_tilts(shapes, mesh, ways, layer.tilts)
-        return self._told(inputs, layer, wanted, traced, lobes.rays)
-
-    def _told(
-        self, inputs: Inputs, layer: LayerRadiance, wanted: Bools, final_rays: int, lobe_rays: int
-    ) -> Indirect:
-        inner, sent, tier = inputs[Meetings], inputs[Sent], inputs[Chosen].tier
-        traced = {
-            "rays_between_vertices": inner.rays if Meetings in inputs.rebuilt else 0,
-            "rays_of_receivers": final_rays,
-            "rays_of_lobes": lobe_rays,
-            "rays_to_lights": sent.rays if Sent in inputs.rebuilt else 0,
-            "receivers": int(wanted.sum()),
-        }
-        held = sum(table.nbytes for table in inner.tables) + self._tables.nbytes + self._lobes.nbytes
-        separated = inputs[Separated]
-        facts = {
-            "rays": float(sum(tier.final)),
-            "lobe_rays": float(tier.lobes),
-            "inner_rays": float(sum(tier.inner)),
-            "functions": float(separated.count.max(initial=0)),
-            "lobe_error": float(separated.error.max(initial=0)),
-            "steps": float(sent.sources.steps),
-            "bytes": float(held + sent.nbytes + separated.nbytes + self._neighbours.nbytes),
-        }
-        return Indirect(inputs[Surfaces], layer, wanted, tier.last, traced, facts)
-
-
 def _covered(met: Meetings, surfaces: Surfaces, neighbours: npt.NDArray[np.int32]) -> Covered:
     """Vertices most of whose rays meet insides; those without a ray are free."""
     first, mesh = met.tables[0], surfaces.mesh
@@ -352,25 +209,19 @@ def _covered(met: Meetings, surfaces: Surfaces, neighbours: npt.NDArray[np.int32
     return Covered.of(inside, mesh.positions, neighbours)
 
 
-_NO_RAYS = np.zeros((0, 0, 3), np.float32)
-
-
 def _params(frame: Frame) -> Any:
     assert frame.indirect is not None  # or nobody would run these stages
     return frame.indirect.params
 
 
-def stages(services: Services) -> list[Any]:
-    """Fresh ones, in order."""
-    neighbours = Neighbours()
-    return [
-        TierStage(),
-        SeparateStage(),
-        ReflectingStage(services),
-        MeetingsStage(services),
-        SentStage(services, neighbours),
-        FinalStage(services, neighbours),
-    ]
-
-
-__all__ = ["Tier", "stages"]
+__all__ = [
+    "FINAL_SEED",
+    "Meetings",
+    "MeetingsStage",
+    "Reflecting",
+    "ReflectingStage",
+    "Sent",
+    "SentStage",
+    "SeparateStage",
+    "Tables",
+]

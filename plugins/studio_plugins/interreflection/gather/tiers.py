@@ -15,7 +15,10 @@ from studio_core.shading.pipeline import Inputs
 @dataclass(frozen=True)
 class Tier:
     """Rays of a vertex, of a receiver and of its lobes; functions of a lobe as a source, with what tolerance;
-    samples of an area lamp and of the environment as sources. `last`: nothing finer was asked for."""
+    samples of an area lamp and of the environment as sources; how often short rays are followed on (`near`).
+
+    `last`: nothing finer was asked for.
+    """
 
     inner: tuple[int, ...]
     final: tuple[int, ...]
@@ -24,6 +27,7 @@ class Tier:
     lobe_error: float
     lamp_samples: int
     environment_samples: int
+    follow: int = 0
     last: bool = False
 
 
@@ -37,7 +41,9 @@ class Chosen:
 
 HAND = Tier((16,), (64,), 32, 16, 0.15, 4, 64)
 REST = Tier((16, 48), (64, 192), 64, 36, 0.05, 16, 256)
-FINE = Tier((16, 48), (64, 192, 768), 128, 36, 0.05, 16, 1024)
+CLOSE = replace(REST, follow=1)
+CLOSER = replace(REST, follow=4)
+FINE = Tier((16, 48), (64, 192, 768), 128, 36, 0.05, 16, 1024, 8)
 ENOUGH_IN_HAND, ENOUGH_AT_REST = 6.0, 2.5
 """Errors of indirect light, %, that these have in most rooms (docs/interreflection.md)."""
 
@@ -46,7 +52,7 @@ def tiers(tolerance: float) -> tuple[Tier, ...]:
     """In hand, then at rest: `tolerance` is the relative error of indirect light that is aimed at, in %."""
     made = [HAND]
     if tolerance < ENOUGH_IN_HAND:
-        made.append(REST)
+        made += [REST, CLOSE, CLOSER]
     if tolerance < ENOUGH_AT_REST:
         made.append(FINE)
     return (*made[:-1], replace(made[-1], last=True))

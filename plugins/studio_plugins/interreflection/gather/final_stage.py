@@ -1,0 +1,173 @@
+"""The last stage: what receivers get of all that is sent."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from studio_core.contract import Services
+from studio_core.scene.diff import Aspect
+from studio_core.shading.artifacts import (
+    Casters,
+    Indirect,
+    LayerRadiance,
+    Lighting,
+    Receivers,
+    Shapes,
+    Surfaces,
+)
+from studio_core.shading.brute_force import blank_layer
+from studio_core.shading.frame import Frame
+from studio_core.shading.job import Job
+from studio_core.shading.kept import Kept
+from studio_core.shading.path_world import PathWorlds
+from studio_core.shading.pipeline import Inputs
+from studio_core.shading.tilting import Facing, facings, gather_tilts
+from studio_core.transport.operator import Transport
+from studio_core.transport.separable import Separated
+from studio_plugins.interreflection.gather.collecting import NO_RAYS, Collector, Rays, Sending
+from studio_plugins.interreflection.gather.lobe_rays import Drawn, LobeRays
+from studio_plugins.interreflection.gather.near import Near, followed, near_rays, trusted
+from studio_plugins.interreflection.gather.smooth import Neighbours, Spacing, smoothed
+from studio_plugins.interreflection.gather.stages import FINAL_SEED, Meetings, Sent, Tables
+from studio_plugins.interreflection.gather.tiers import Chosen
+
+F32 = npt.NDArray[np.float32]
+I64 = npt.NDArray[np.int64]
+Bools = npt.NDArray[np.bool_]
+FOLLOW_SEED = 4000
+
+
+class FinalStage:
+    """What receivers get of all that is sent."""
+
+    needs: tuple[type, ...] = (
+        Surfaces,
+        Casters,
+        Shapes,
+        Lighting,
+        Receivers,
+        Chosen,
+        Separated,
+        Meetings,
+        Sent,
+    )
+    gives = Indirect
+    dirtied_by = Aspect.VIEW
+
+    def __init__(self, services: Services, neighbours: Neighbours) -> None:
+        self._workers = services.workers
+        self._tables = Tables(services, FINAL_SEED)
+        self._lobes = LobeRays(services)
+        self._worlds = PathWorlds(services.registry)
+        self._neighbours = neighbours
+        self._spacing: Kept[Spacing] = Kept()
+        self._meetings: Meetings | None = None
+
+    def run(self, frame: Frame, inputs: Inputs, job: Job) -> Indirect:
+        """The layer at the receivers."""
+        surfaces, shapes, receivers = inputs[Surfaces], inputs[Shapes], inputs[Receivers]
+        mesh, sent, tier = surfaces.mesh, inputs[Sent], inputs[Chosen].tier
+        wanted, casters = receivers.seen, inputs[Casters]
+        met = self._tables(tier.final, surfaces, casters, wanted, self._meetings, job)
+        traced = 0 if met is self._meetings else met.rays
+        self._meetings = met
+        lobes = self._lobes.update(frame.scene, surfaces, casters, shapes, receivers, tier.lobes, job)
+        eye = (receivers.eye - mesh.origin).astype(np.float32)
+        flat, cosine_rays = inputs[Separated].matte, sum(tier.final)
+        collector = Collector(mesh, shapes, flat, eye, lobes, cosine_rays, self._workers, job)
+        spacing = self._spacing(lambda: Spacing.of(met.tables[0], self._workers, job), met)
+        neighbours = self._neighbours(mesh)
+        sending = Sending.of(sent.sources.light, sent.surface)
+        vertices, layer = np.flatnonzero(wanted), blank_layer(mesh, shapes)
+        ways = facings(mesh, shapes, layer)
+        for way in ways:
+            needed = _needed(vertices, way)
+            for rays in (*map(_of_pattern, met.tables), *_of_lobes(lobes)):
+                collector.add(rays, sending, needed, way, way.terms, way.irradiance)
+            mask = np.zeros(len(wanted), np.bool_)
+            mask[needed] = True
+            given = (way.irradiance, met.tables[0], mask, spacing, mesh, neighbours, cosine_rays)
+            way.irradiance[:] = smoothed(*given, self._workers, job)
+            collector.add_flat(needed, way.terms, way.irradiance)
+        near = self._look_closer(frame, inputs, met, collector, ways, vertices, job) if tier.follow else 0
+        if layer.tilts is not None:
+            gather_tilts(shapes, mesh, ways, layer.tilts)
+        counts = {
+            "rays_of_receivers": traced,
+            "rays_of_lobes": lobes.rays,
+            "rays_followed": near,
+            "receivers": len(vertices),
+        }
+        return self._told(inputs, layer, wanted, counts)
+
+    def _look_closer(
+        self,
+        frame: Frame,
+        inputs: Inputs,
+        met: Meetings,
+        collector: Collector,
+        ways: list[Facing],
+        vertices: I64,
+        job: Job,
+    ) -> int:
+        """Adds what `near` tells; how many rays were followed on."""
+        surfaces, sent, follow = inputs[Surfaces], inputs[Sent], inputs[Chosen].tier.follow
+        mesh, separated = surfaces.mesh, inputs[Separated]
+        world = self._worlds(frame.scene, surfaces, inputs[Casters], inputs[Lighting])
+        found: list[tuple[Transport, Near]] = []
+        for number, table in enumerate(met.tables):
+            which = table.row_of[vertices].astype(np.int64)
+            rows, rays = near_rays(table, which, mesh.area, collector.row, separated.error)
+            seed = FOLLOW_SEED + 64 * number
+            given = (mesh, world, sent.sources, sent.surface, self._workers, job)
+            found.append((table, followed(table, rows, rays, follow, seed, *given)))
+        trust = trusted(found, len(mesh.positions))
+        for way in ways:
+            needed = _needed(vertices, way)
+            terms, irradiance = np.zeros_like(way.terms), np.zeros_like(way.irradiance)
+            for table, near in found:
+                rays_of = _of_pattern(table)._replace(vertex=near.numbered(table))
+                collector.add(rays_of, Sending.along_rays(near.change), needed, way, terms, irradiance)
+            collector.add_flat(needed, terms, irradiance)
+            way.terms[:] += trust[:, None, None] * terms
+            way.irradiance[:] = np.maximum(way.irradiance + trust[:, None] * irradiance, 0)
+        return sum(len(near.row) for _, near in found) * follow
+
+    def _told(self, inputs: Inputs, layer: LayerRadiance, wanted: Bools, counts: dict[str, int]) -> Indirect:
+        inner, sent, tier = inputs[Meetings], inputs[Sent], inputs[Chosen].tier
+        counts = {
+            "rays_between_vertices": inner.rays if Meetings in inputs.rebuilt else 0,
+            "rays_to_lights": sent.rays if Sent in inputs.rebuilt else 0,
+            **counts,
+        }
+        held = sum(table.nbytes for table in inner.tables) + self._tables.nbytes + self._lobes.nbytes
+        separated = inputs[Separated]
+        facts = {
+            "rays": float(sum(tier.final)),
+            "lobe_rays": float(tier.lobes),
+            "inner_rays": float(sum(tier.inner)),
+            "functions": float(separated.count.max(initial=0)),
+            "lobe_error": float(separated.error.max(initial=0)),
+            "steps": float(sent.sources.steps),
+            "bytes": float(held + sent.nbytes + separated.nbytes + self._neighbours.nbytes),
+        }
+        return Indirect(inputs[Surfaces], layer, wanted, tier.last, counts, facts)
+
+
+def _needed(vertices: I64, way: Facing) -> I64:
+    return vertices if way.leaning is None else vertices[way.leaning[vertices]]
+
+
+def _of_pattern(table: Transport) -> Rays:
+    hits = table.table
+    directions = table.pattern.directions
+    return Rays(table.rows, table.row_of, table.variant, hits.vertex, hits.cell, directions, NO_RAYS)
+
+
+def _of_lobes(lobes: Drawn) -> tuple[Rays, ...]:
+    table = lobes.transport
+    if table is None:
+        return ()
+    hits = table.table
+    return (Rays(table.rows, table.row_of, table.variant, hits.vertex, hits.cell, NO_RAYS, lobes.directions),)
