@@ -24,7 +24,17 @@ from studio_core.kernels.packets import (
     clear_hits,
     new_packet,
 )
-from studio_core.kernels.path_state import AREA, ENDED, I64, Lights, Mesh, Paths, Tracer, area_weight, scrambled
+from studio_core.kernels.path_state import (
+    AREA,
+    ENDED,
+    I64,
+    Lights,
+    Mesh,
+    Paths,
+    Tracer,
+    area_weight,
+    scrambled,
+)
 
 NO_BACK = np.uint32(0xFFFFFFFF)
 LEAST_SHARE = 1e-4

@@ -33,6 +33,9 @@ U16 = npt.NDArray[np.uint16]
 U32 = npt.NDArray[np.uint32]
 U64 = npt.NDArray[np.uint64]
 
+BELOW = -0.1
+"""Cosine with the geometric normal below which rays are not followed: shading normals of smooth, closed rooms
+differ from geometric ones by less, and their rays must all meet something."""
 COUNTS = 2
 TRACED, ASKED = range(COUNTS)
 """Columns of counts: rays traced against the scene, and against one object alone."""
@@ -104,7 +107,7 @@ def _follow(
 ) -> int:
     """Traces the marked rays and writes what they meet; how many.
 
-    A ray that a shading normal lets leave into the surface itself meets nothing.
+    A ray that a shading normal lets leave well into the surface itself meets nothing.
     """
     rays = directions.shape[1]
     row_of, ray_of, met = np.empty(8, np.int64), np.empty(8, np.int64), np.empty(8, np.int64)
@@ -129,10 +132,10 @@ def _follow(
                     packet[ORIGIN + axis, used] = origin[column, axis] + shift[axis]
                     packet[DIRECTION + axis, used] = along[used, axis]
                 packet[TFAR, used] = np.inf
-                valid[used] = -1 if 0.0 < size < np.inf and clear > 0.0 else 0
+                valid[used] = -1 if 0.0 < size < np.inf and clear > BELOW else 0
                 row_of[used], ray_of[used] = row, ray
                 used += 1
-                traced += 1 if valid[used - 1] != 0 else 0
+                traced += 1
             if used == 8 or (last and used > 0):
                 for lane in range(used, 8):
                     valid[lane] = 0

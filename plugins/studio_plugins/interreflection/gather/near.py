@@ -116,8 +116,8 @@ def followed(
             begin_near(start, stop, number, rows[part], rays[part], *pattern, origin_of, paths)
 
         def end(start: int, stop: int) -> None:
-            sent: Any = (beyond.matte, *tables, beyond.functions)
-            end_near(start, stop, active, *frames, *sent, paths)
+            every: Any = (*frames, beyond.matte, *tables, beyond.functions, paths)
+            end_near(start, stop, active, *every)
 
         workers.run(len(paths.material), CHUNK, begin, job)
         active = np.arange(len(paths.material))
