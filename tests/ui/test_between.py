@@ -173,14 +173,17 @@ def test_a_legend_keeps_to_its_corner(qapp: QApplication) -> None:
 
 
 def test_facts_are_told_in_words(driver: Driver) -> None:
-    text = told_facts({"rays": 181000.0, "bytes": 7.25e6, "K": 16.0, "odd_things": 3.0})
-    assert text == "181,000 rays, 7.2 MB in memory, 16 functions of a surface's gloss (K), 3 odd things"
+    text = told_facts({"rays": 181000.0, "bytes": 7.25e6, "K": 16.0, "lobe_error": 0.214, "odd_things": 3.0})
+    assert text == (
+        "181,000 rays from every point, 7.2 MB in memory, 16 functions of a surface's gloss (K), "
+        "21 % error of the sharpest gloss as a source, 3 odd things"
+    )
     part, last = section(driver), driver.feed.last
     assert part.facts.isHidden()
     radiance = SimpleNamespace(**{**vars(last.picture.radiance), "facts": {"rays": 12.0}})
     picture = dataclasses.replace(last.picture, radiance=radiance)
     driver.feed.shown.emit(dataclasses.replace(last, picture=picture))
-    assert part.facts.text() == "12 rays"
+    assert part.facts.text() == "12 rays from every point"
 
 
 def test_the_error_of_light_between_surfaces_is_told(driver: Driver) -> None:

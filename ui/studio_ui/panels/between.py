@@ -32,10 +32,14 @@ BOUNCES = "bounces"
 SETTLES = ("settle", "converged")
 """Flags of methods that make their number of bounces idle."""
 _WORDS = {
-    "rays": "rays",
+    "rays": "rays from every point",
+    "lobe_rays": "more where it is glossy",
+    "inner_rays": "from hidden points",
     "functions": "functions of glossy surfaces",
     "paths a vertex": "paths from every point",
     "bounces": "bounces",
+    "steps": "bounces",
+    "lobe_error": "error of the sharpest gloss as a source",
     "N": "functions of an object's light (N)",
     "K": "functions of a surface's gloss (K)",
     "shells": "shells around every object",
@@ -168,6 +172,8 @@ def told_facts(facts: Mapping[str, float]) -> str:
         if name.startswith("bytes"):
             kept = name.removeprefix("bytes").strip(" _").replace("_", " ")
             parts.append(f"{value / 1e6:,.1f} MB {kept or 'in memory'}")
+        elif name.endswith("error"):
+            parts.append(f"{100 * value:.0f} % {_WORDS.get(name, name.replace('_', ' '))}")
         else:
             parts.append(f"{value:,.6g} {_WORDS.get(name, name.replace('_', ' '))}")
     return ", ".join(parts)
