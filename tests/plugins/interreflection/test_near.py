@@ -14,7 +14,7 @@ from studio.bench.harness import unbiased_rmse
 from studio_core.contract import Services
 from studio_core.scene.nodes import AreaLamp, Material
 from studio_core.scene.transform import looking
-from studio_core.transport.hits import BLACK, NOTHING, HitTable
+from studio_core.transport.hits import BLACK, NOTHING
 from studio_plugins.interreflection.gather import near, tiers
 from studio_plugins.interreflection.gather.near import Near, near_rays, trusted
 
@@ -56,10 +56,8 @@ def test_followed_rays_do_without_a_fine_mesh(
 
 
 def table_of(vertex: Any, distance: Any) -> Any:
-    hits = HitTable(
-        np.asarray(vertex, np.uint32), np.zeros(np.shape(vertex), np.uint16), np.asarray(distance, np.float16)
-    )
-    return SimpleNamespace(table=hits, rows=np.arange(len(hits)))
+    met, far = np.asarray(vertex, np.uint32), np.asarray(distance, np.float16)
+    return SimpleNamespace(vertex=met, distance=far, rows=np.arange(len(met)))
 
 
 def test_short_rays_are_near_and_sharp_lobes_are_near_for_longer() -> None:

@@ -27,13 +27,16 @@ NO_RAYS = np.zeros((0, 0, 3), np.float32)
 
 
 class Rays(NamedTuple):
-    """Rays of rows (R,) of receivers: what they met (R, N); directions as in `final.gather_final`."""
+    """Rays of rows (R,) of receivers: what they met (R, N), and how far away; directions as in
+    `final.gather_final`.
+    """
 
     rows: I64
     row_of: I32
     variant: I32
     vertex: U32
     cell: U16
+    distance: npt.NDArray[np.float16]
     pattern: F32
     world: F32
 

@@ -24,6 +24,7 @@ from studio_core.shading.path_world import PathWorlds
 from studio_core.shading.pipeline import Inputs
 from studio_core.shading.tilting import Facing, facings, gather_tilts
 from studio_core.transport.operator import Transport
+from studio_core.transport.rows import Rows
 from studio_core.transport.separable import Separated
 from studio_plugins.interreflection.gather.collecting import NO_RAYS, Collector, Rays, Sending
 from studio_plugins.interreflection.gather.lobe_rays import Drawn, LobeRays
@@ -90,7 +91,10 @@ class FinalStage:
             given = (way.irradiance, met.tables[0], mask, spacing, mesh, neighbours, cosine_rays)
             way.irradiance[:] = smoothed(*given, self._workers, job)
             collector.add_flat(needed, way.terms, way.irradiance)
-        near = self._look_closer(frame, inputs, met, collector, ways, vertices, job) if tier.follow else 0
+        near = 0
+        if tier.follow:
+            every = (*map(_of_pattern, met.tables), *_of_lobes(lobes))
+            near = self._look_closer(frame, inputs, every, collector, ways, vertices, job)
         if layer.tilts is not None:
             gather_tilts(shapes, mesh, ways, layer.tilts)
         counts = {
@@ -105,7 +109,7 @@ class FinalStage:
         self,
         frame: Frame,
         inputs: Inputs,
-        met: Meetings,
+        every: tuple[Rays, ...],
         collector: Collector,
         ways: list[Facing],
         vertices: I64,
@@ -115,20 +119,20 @@ class FinalStage:
         surfaces, sent, follow = inputs[Surfaces], inputs[Sent], inputs[Chosen].tier.follow
         mesh, separated = surfaces.mesh, inputs[Separated]
         world = self._worlds(frame.scene, surfaces, inputs[Casters], inputs[Lighting])
-        found: list[tuple[Transport, Near]] = []
-        for number, table in enumerate(met.tables):
-            which = table.row_of[vertices].astype(np.int64)
-            rows, rays = near_rays(table, which, mesh.area, collector.row, separated.error)
+        found: list[tuple[Rays, Near]] = []
+        given = (mesh, world, sent.sources, sent.surface, self._workers, job)
+        for number, rays in enumerate(every):
+            which = rays.row_of[vertices].astype(np.int64)
+            row, ray = near_rays(rays, which[which >= 0], mesh.area, collector.row, separated.error)
             seed = FOLLOW_SEED + 64 * number
-            given = (mesh, world, sent.sources, sent.surface, self._workers, job)
-            found.append((table, followed(table, rows, rays, follow, seed, *given)))
+            found.append((rays, followed(rays, row, ray, follow, seed, *given)))
         trust = trusted(found, len(mesh.positions))
         for way in ways:
             needed = _needed(vertices, way)
             terms, irradiance = np.zeros_like(way.terms), np.zeros_like(way.irradiance)
-            for table, near in found:
-                rays_of = _of_pattern(table)._replace(vertex=near.numbered(table))
-                collector.add(rays_of, Sending.along_rays(near.change), needed, way, terms, irradiance)
+            for rays, near in found:
+                own = rays._replace(vertex=near.numbered(rays))
+                collector.add(own, Sending.along_rays(near.change), needed, way, terms, irradiance)
             collector.add_flat(needed, terms, irradiance)
             way.terms[:] += trust[:, None, None] * terms
             way.irradiance[:] = np.maximum(way.irradiance + trust[:, None] * irradiance, 0)
@@ -160,14 +164,14 @@ def _needed(vertices: I64, way: Facing) -> I64:
 
 
 def _of_pattern(table: Transport) -> Rays:
-    hits = table.table
-    directions = table.pattern.directions
-    return Rays(table.rows, table.row_of, table.variant, hits.vertex, hits.cell, directions, NO_RAYS)
+    return _rays(table, table.pattern.directions, NO_RAYS)
 
 
 def _of_lobes(lobes: Drawn) -> tuple[Rays, ...]:
-    table = lobes.transport
-    if table is None:
-        return ()
+    return () if lobes.transport is None else (_rays(lobes.transport, NO_RAYS, lobes.directions),)
+
+
+def _rays(table: Rows, pattern: F32, world: F32) -> Rays:
     hits = table.table
-    return (Rays(table.rows, table.row_of, table.variant, hits.vertex, hits.cell, NO_RAYS, lobes.directions),)
+    met = (hits.vertex, hits.cell, hits.distance)
+    return Rays(table.rows, table.row_of, table.variant, *met, pattern, world)

@@ -34,7 +34,7 @@ from studio_core.shading.path_world import PathWorld
 from studio_core.transport.bounces import Light, Sources, Surface
 from studio_core.transport.cells import cell_of
 from studio_core.transport.hits import BLACK, NOTHING
-from studio_core.transport.operator import Transport
+from studio_plugins.interreflection.gather.collecting import Rays
 
 F32 = npt.NDArray[np.float32]
 F64 = npt.NDArray[np.float64]
@@ -59,33 +59,33 @@ class Near:
     ray: I64
     change: F32
 
-    def numbered(self, table: Transport) -> U32:
-        """(R, N) which of these a ray of the table is; NOTHING: none."""
-        made = np.full(table.table.vertex.shape, NOTHING, np.uint32)
+    def numbered(self, rays: Rays) -> U32:
+        """(R, N) which of these a ray is; NOTHING: none."""
+        made = np.full(rays.vertex.shape, NOTHING, np.uint32)
         made[self.row, self.ray] = np.arange(len(self.row), dtype=np.uint32)
         return made
 
 
-def near_rays(table: Transport, which: I64, area: F32, row: I32, error: F32) -> tuple[I64, I64]:
-    """Rows and rays of rows `which` (C,) that are to be followed on.
+def near_rays(rays: Rays, which: I64, area: F32, row: I32, error: F32) -> tuple[I64, I64]:
+    """Which rows, and which of their rays, of rows `which` (C,), are to be followed on.
 
     area (V,) is what each vertex stands for, row (V,) that of its BRDF, and error (R,) how wrong that is as
     products.
     """
     sharp = np.append(error, np.float32(0))[row] > SHARP
     reach = np.where(sharp, np.float32(NEAR_SHARP), np.float32(NEAR)) * np.sqrt(2 * area)
-    vertex = table.table.vertex[which]
+    vertex = rays.vertex[which]
     met = vertex < BLACK
     limit = reach[np.where(met, vertex, 0)]
-    found = met & (table.table.distance[which].astype(np.float32) < limit)
+    found = met & (rays.distance[which].astype(np.float32) < limit)
     place, ray = np.nonzero(found)
     return which[place], ray.astype(np.int64)
 
 
 def followed(
-    table: Transport,
-    rows: I64,
-    rays: I64,
+    rays: Rays,
+    row: I64,
+    ray: I64,
     samples: int,
     seed: int,
     mesh: WorldMesh,
@@ -95,25 +95,24 @@ def followed(
     workers: Workers,
     job: Job,
 ) -> Near:
-    """The rays followed on, each `samples` times."""
+    """Rays (K,) `ray` of rows `row` followed on, each `samples` times."""
     caster = world.casters.primary
     places = mesh.positions + mesh.origin
-    own = table.rows[rows]
-    used = np.unique(own)
+    used = np.unique(rays.rows[row])
     origin_of = np.zeros((len(mesh.positions), 3), np.float32)
     origin_of[used] = lifted(caster, places[used], mesh.geometric[used], mesh.inset[used])
-    change = np.zeros((len(rows), 3), np.float32)
+    change = np.zeros((len(row), 3), np.float32)
     dark = Light(np.zeros_like(sources.light.matte), np.zeros_like(sources.light.functions))
     beyond, known = sources.before or dark, surface.separated
     tables = (surface.slot, surface.row, known.base, known.count, known.outgoing)
-    pattern = (table.rows, table.variant, table.pattern.directions, mesh.normals, mesh.tangents)
-    frames, hits = (mesh.normals, mesh.tangents), table.table
+    frames = (mesh.normals, mesh.tangents)
+    drawn = (rays.rows, rays.variant, rays.pattern, rays.world, *frames)
 
     def along(part: slice, number: int) -> F32:
         paths = Paths.of(part.stop - part.start)
 
         def begin(start: int, stop: int) -> None:
-            begin_near(start, stop, number, rows[part], rays[part], *pattern, origin_of, paths)
+            begin_near(start, stop, number, row[part], ray[part], *drawn, origin_of, paths)
 
         def end(start: int, stop: int) -> None:
             every: Any = (*frames, beyond.matte, *tables, beyond.functions, paths)
@@ -134,16 +133,16 @@ def followed(
 
     def differ(start: int, stop: int) -> None:
         told = (sources.light.matte, *tables, sources.light.functions)
-        every: Any = (hits.vertex, hits.cell, *told, change)
-        subtract_sent(start, stop, rows, rays, *every)
+        every: Any = (rays.vertex, rays.cell, *told, change)
+        subtract_sent(start, stop, row, ray, *every)
 
-    for first in range(0, len(rows), AT_ONCE):
-        part = slice(first, min(first + AT_ONCE, len(rows)))
+    for first in range(0, len(row), AT_ONCE):
+        part = slice(first, min(first + AT_ONCE, len(row)))
         for sample in range(samples):
-            job.checkpoint(first * samples, len(rows) * samples)
+            job.checkpoint(first * samples, len(row) * samples)
             change[part] += along(part, seed + sample) / np.float32(samples)
-    workers.run(len(rows), CHUNK, differ, job)
-    return Near(rows, rays, change)
+    workers.run(len(row), CHUNK, differ, job)
+    return Near(row, ray, change)
 
 
 def _follow(active: I64, escapes: bool, world: PathWorld, paths: Paths, workers: Workers, job: Job) -> None:
@@ -177,21 +176,31 @@ def begin_near(
     rows: I64,
     variant: I32,
     pattern: F32,
+    world: F32,
     normals: F32,
     tangents: F32,
     origins: F32,
     paths: Paths,
 ) -> None:
-    """Paths start … stop−1 along rays `ray` (K,) of rows `row` (K,) of a table; origins (V, 3)."""
+    """Paths start … stop−1 along rays `ray` (K,) of rows `row` (K,) of a table; origins (V, 3).
+
+    Directions are those of the pattern or, where that is empty, of `world`; see `final.gather_final`.
+    """
     axes = np.empty((3, 3))
+    drawn = len(world) > 0
     for n in range(start, stop):
         v = rows[row[n]]
-        surface_frame(normals[v], tangents[v], axes)
-        a = variant[row[n]]
-        x, y, z = pattern[a, ray[n], 0], pattern[a, ray[n], 1], pattern[a, ray[n], 2]
+        if drawn:
+            for axis in range(3):
+                paths.direction[n, axis] = world[row[n], ray[n], axis]
+        else:
+            surface_frame(normals[v], tangents[v], axes)
+            a = variant[row[n]]
+            x, y, z = pattern[a, ray[n], 0], pattern[a, ray[n], 1], pattern[a, ray[n], 2]
+            for axis in range(3):
+                paths.direction[n, axis] = axes[0, axis] * x + axes[1, axis] * y + axes[2, axis] * z
         for axis in range(3):
             paths.origin[n, axis] = origins[v, axis]
-            paths.direction[n, axis] = axes[0, axis] * x + axes[1, axis] * y + axes[2, axis] * z
             paths.throughput[n, axis] = 1.0
             paths.radiance[n, axis] = 0.0
         paths.density[n] = 0.0
@@ -282,16 +291,18 @@ def subtract_sent(
         out[n, 2] -= b
 
 
-def trusted(found: Sequence[tuple[Transport, Near]], vertices: int) -> F32:
+def trusted(found: Sequence[tuple[Rays, Near]], vertices: int) -> F32:
     """(V,) how much of each receiver's mean δ is more than its noise: 1 − s² / m², at least 0."""
-    rays = sum(table.table.rays for table, _ in found)
-    total, squares = np.zeros(vertices), np.zeros(vertices)
-    for table, near in found:
+    count, total, squares = np.zeros(vertices), np.zeros(vertices), np.zeros(vertices)
+    for rays, near in found:
         light = near.change.mean(axis=1, dtype=np.float64)
-        receiver = table.rows[near.row]
-        total += np.bincount(receiver, light, vertices) / rays
-        squares += np.bincount(receiver, light**2, vertices) / rays
-    noise = np.maximum(squares - total**2, 0) / rays
+        receiver = rays.rows[near.row]
+        count[rays.rows] += rays.vertex.shape[1]
+        total += np.bincount(receiver, light, vertices)
+        squares += np.bincount(receiver, light**2, vertices)
+    count = np.maximum(count, 1)
+    mean = total / count
+    noise = np.maximum(squares / count - mean**2, 0) / count
     with np.errstate(divide="ignore", invalid="ignore"):
-        share = 1 - noise / total**2
-    return np.where(total != 0, np.clip(share, 0, 1), 0).astype(np.float32)
+        share = 1 - noise / mean**2
+    return np.where(mean != 0, np.clip(share, 0, 1), 0).astype(np.float32)
