@@ -102,14 +102,37 @@ def work(program: Headless) -> None:
 
 
 def _bounce(program: Headless, frame: Any) -> None:
-    """Light between surfaces by path tracing, which errors are measured by."""
+    """Light between surfaces: by path tracing, which errors are measured by, and as the window shows it."""
     from studio_core.shading.offline import backend_params, indirect_choice, measured_picture
 
     backend = program.registry.get("backend", "reference")
     params = backend_params(backend, {"vertices": 1500, "directions": "1024"})
-    paths = indirect_choice(program.registry, "paths", {"samples": 4})
     services = dataclasses.replace(program.services, cache=None)
-    measured_picture(frame.scene, frame.view, backend, params, services, 4, indirect=paths)
+    paths = indirect_choice(program.registry, "paths", {"samples": 4})
+    gather = indirect_choice(program.registry, "gather", {})
+    for scene, method in ((frame.scene, paths), (frame.scene, gather), (_embossed(frame.scene), gather)):
+        measured_picture(scene, frame.view, backend, params, services, 4, indirect=method)
+    _bounce_in_hand(frame, services, backend, params, gather)
+
+
+def _bounce_in_hand(frame: Any, services: Any, backend: Any, params: Any, gather: Any) -> None:
+    """What is traced again while something moves."""
+    from studio_core.edits import Move
+    from studio_core.raster import PictureStage
+    from studio_core.scene.diff import Changes, diff
+    from studio_core.scene.nodes import Group
+    from studio_core.scene.transform import Transform
+    from studio_core.shading.indirect import with_indirect
+    from studio_core.shading.job import Job
+    from studio_core.shading.pipeline import Pipeline
+
+    pipeline = Pipeline([*with_indirect(backend.stages(services), services), PictureStage(services)])
+    still = dataclasses.replace(frame, params=params, moving=True, indirect=gather)
+    pipeline.update(still, Changes(), Job("compiling ahead"))
+    group = next(frame.scene.of(Group))
+    scene = Move({group.id: Transform((0.1, 0.0, 0.05)) @ group.transform})(frame.scene)
+    moved = dataclasses.replace(still, scene=scene)
+    pipeline.update(moved, diff(frame.scene, scene), Job("compiling ahead"))
 
 
 def _embossed(scene: Any) -> Any:

@@ -12,15 +12,15 @@ if TYPE_CHECKING:
     from studio.headless import Headless
     from studio_core.shading.frame import IndirectChoice
 
-NONE = "none"
+NONE, USUAL = "none", "gather"
 BOUNCES = "bounces"
 """The parameter of a method that `--bounces` is."""
 
 
 def add_options(verb: argparse.ArgumentParser) -> None:
     """How light goes on between surfaces."""
-    text = "how light goes on between surfaces: gather, fields, paths, or none (default: none)"
-    verb.add_argument("--indirect", default=NONE, metavar="ID", help=text)
+    text = "how light goes on between surfaces: gather, fields, paths, or none (default: %(default)s)"
+    verb.add_argument("--indirect", default=USUAL, metavar="ID", help=text)
     verb.add_argument("--bounces", type=int, metavar="N", help="from how many surfaces light comes at most")
     verb.add_argument(
         "--indirect-param",

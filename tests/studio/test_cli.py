@@ -168,11 +168,11 @@ NEW = ("new", "made.lucarne")
         ((*RENDER, "--camera", "Nobody"), ("'Nobody'", "'Camera'")),
         ((*RENDER, "--camera", "Floor"), ("'Floor'", "'Camera'")),
         ((*RENDER, "--indirect", "bounce"), ("--indirect 'bounce'", "none")),
-        ((*RENDER, "--light", "share"), ("--light share", "--indirect")),
+        ((*RENDER, "--indirect", "none", "--light", "share"), ("--light share", "--indirect")),
         ((*RENDER, "--light", "dim"), ("--light", "'dim'", "share")),
         ((*RENDER, "--light", "share", "--alpha"), ("--light share", "--alpha")),
-        ((*RENDER, "--indirect-param", "level=1"), ("--indirect-param", "--indirect")),
-        ((*RENDER, "--bounces", "3"), ("--bounces", "--indirect")),
+        ((*RENDER, "--indirect", "none", "--indirect-param", "level=1"), ("--indirect-param", "--indirect")),
+        ((*RENDER, "--indirect", "none", "--bounces", "3"), ("--bounces", "--indirect")),
         ((*RENDER, "--bounces", "some"), ("--bounces", "'some'")),
         (("radiance", "room.lucarne", "-o", "x.txt"), ("x.txt", ".npz")),
         (("radiance", "nix.lucarne", "-o", "x.npz"), ("nix.lucarne", "no such file")),
@@ -489,10 +489,10 @@ def test_help_and_version_are_successes(run: Run) -> None:
 def test_render_png_and_exr(files: Path, run: Run) -> None:
     said = only_json(run("render", "room.lucarne", "-o", "x.exr", *SMALL, "--json"))
     assert set(said.pop("seconds")) == {"shading", "composing"}
+    assert said.pop("indirect")["method"] == "gather"
     assert said | {"counts": {}, "mean": 0, "vertices": 0, "shaded": 0} == {
         "project": "room.lucarne",
         "picture": "x.exr",
-        "indirect": None,
         "light": "all",
         "backend": "cuts",
         "width": 32,
@@ -560,6 +560,8 @@ def test_radiance_can_be_repeated_by_somebody_else(files: Path, run: Run) -> Non
             4096,
             "--param",
             "vertices=1500",
+            "--indirect",
+            "none",
             "--json",
         )
     )
