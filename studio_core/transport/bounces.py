@@ -20,7 +20,7 @@ import numpy.typing as npt
 from studio_core.parallel import Workers
 from studio_core.shading.job import Job
 from studio_core.transport.cells import cells_of
-from studio_core.transport.gather import gather_bounce, reflect, uncover
+from studio_core.transport.gather import gather_bounce, reflect, send, uncover
 from studio_core.transport.hits import HitTable
 from studio_core.transport.patterns import Pattern
 from studio_core.transport.separable import Separated
@@ -195,6 +195,32 @@ def received(
             )
 
         workers.run(len(table.rows), CHUNK, run, job)
+    return made
+
+
+def sent_towards(
+    light: Light, surface: Surface, vertex: I64, cell: I64, workers: Workers, job: Job | None = None
+) -> F32:
+    """(K, 3) what each of vertices (K,) sends towards a cell (K,) of its own frame."""
+    made, known = np.empty((len(vertex), 3), np.float32), surface.separated
+
+    def run(start: int, stop: int) -> None:
+        send(
+            start,
+            stop,
+            vertex,
+            cell,
+            light.matte,
+            surface.slot,
+            surface.row,
+            known.base,
+            known.count,
+            known.outgoing,
+            light.functions,
+            made,
+        )
+
+    workers.run(len(vertex), CHUNK, run, job)
     return made
 
 

@@ -101,6 +101,39 @@ def gather_bounce(
 
 
 @kernel
+def send(
+    start: int,
+    stop: int,
+    vertex: I64,
+    cell: I64,
+    matte: F32,
+    slot: I64,
+    row: I32,
+    base: I64,
+    count: I64,
+    outgoing: F32,
+    functions: F32,
+    out: F32,
+) -> None:
+    """out (K, 3): what each of vertices (K,) sends towards a cell of its own, for start … stop−1."""
+    for i in range(start, stop):
+        v = vertex[i]
+        r, g, b = matte[v, 0], matte[v, 1], matte[v, 2]
+        source = slot[v]
+        if source >= 0:
+            its = count[row[v]]
+            at = base[row[v]] + cell[i] * its
+            source *= 3
+            for k in range(its):
+                weight = outgoing[at + k]
+                r += weight * functions[source + k]
+                g += weight * functions[source + its + k]
+                b += weight * functions[source + 2 * its + k]
+            r, g, b = max(r, ZERO), max(g, ZERO), max(b, ZERO)
+        out[i, 0], out[i, 1], out[i, 2] = r, g, b
+
+
+@kernel
 def reflect(
     start: int,
     stop: int,

@@ -125,7 +125,7 @@ def test_a_white_box_settles_at_its_limit(services: Services) -> None:
     mean = (made.layer.irradiance[:, 0] * area).sum() / area.sum()
     straight = 4 * np.pi / area.sum()  # all light of a lamp of 1 W/sr
     assert mean == pytest.approx(straight * 0.8 / 0.2, rel=0.01)
-    assert made.facts["steps"] < 12
+    assert made.facts["rounds"] < 12
 
 
 def test_normal_maps_get_tilts(services: Services) -> None:

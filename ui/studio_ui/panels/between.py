@@ -38,7 +38,7 @@ _WORDS = {
     "functions": "functions of glossy surfaces",
     "paths a vertex": "paths from every point",
     "bounces": "bounces",
-    "steps": "bounces",
+    "rounds": "rounds over all surfaces",
     "lobe_error": "error of the sharpest gloss as a source",
     "N": "functions of an object's light (N)",
     "K": "functions of a surface's gloss (K)",

@@ -153,7 +153,7 @@ class FinalStage:
             "inner_rays": float(sum(tier.inner)),
             "functions": float(separated.count.max(initial=0)),
             "lobe_error": float(separated.error.max(initial=0)),
-            "steps": float(sent.sources.steps),
+            "rounds": float(sent.sources.steps),
             "bytes": float(held + sent.nbytes + separated.nbytes + self._neighbours.nbytes),
         }
         return Indirect(inputs[Surfaces], layer, wanted, tier.last, counts, facts)

@@ -40,7 +40,7 @@ class Gather:
     """See the module; satisfies `studio_core.contract.IndirectMethod`."""
 
     id = "gather"
-    label = "Rays between surfaces (fast)"
+    label = "Kept rays (fast)"
     Params = Params
 
     def stages(self, services: Services) -> Sequence[Any]:

@@ -24,14 +24,14 @@ import numpy.typing as npt
 from studio_core.jit import kernel
 from studio_core.kernels.path_light import light_paths
 from studio_core.kernels.path_rays import follow_paths
-from studio_core.kernels.path_state import ENDED, Paths, seeded
+from studio_core.kernels.path_state import Paths, seeded
 from studio_core.kernels.radiance import surface_frame
 from studio_core.kernels.visibility import lifted
 from studio_core.parallel import Workers
 from studio_core.scene.world_mesh import WorldMesh
 from studio_core.shading.job import Job
 from studio_core.shading.path_world import PathWorld
-from studio_core.transport.bounces import Light, Sources, Surface
+from studio_core.transport.bounces import Sources, Surface, sent_towards
 from studio_core.transport.cells import cell_of
 from studio_core.transport.hits import BLACK, NOTHING
 from studio_plugins.interreflection.gather.collecting import Rays
@@ -48,7 +48,6 @@ NEAR, NEAR_SHARP = 3.0, 10.0
 SHARP = 0.3  # error of separated lobes
 AT_ONCE = 1 << 17  # paths
 CHUNK = 1 << 11
-ZERO = np.float32(0.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,9 +101,6 @@ def followed(
     origin_of = np.zeros((len(mesh.positions), 3), np.float32)
     origin_of[used] = lifted(caster, places[used], mesh.geometric[used], mesh.inset[used])
     change = np.zeros((len(row), 3), np.float32)
-    dark = Light(np.zeros_like(sources.light.matte), np.zeros_like(sources.light.functions))
-    beyond, known = sources.before or dark, surface.separated
-    tables = (surface.slot, surface.row, known.base, known.count, known.outgoing)
     frames = (mesh.normals, mesh.tangents)
     drawn = (rays.rows, rays.variant, rays.pattern, rays.world, *frames)
 
@@ -113,10 +109,6 @@ def followed(
 
         def begin(start: int, stop: int) -> None:
             begin_near(start, stop, number, row[part], ray[part], *drawn, origin_of, paths)
-
-        def end(start: int, stop: int) -> None:
-            every: Any = (*frames, beyond.matte, *tables, beyond.functions, paths)
-            end_near(start, stop, active, *every)
 
         workers.run(len(paths.material), CHUNK, begin, job)
         active = np.arange(len(paths.material))
@@ -128,20 +120,24 @@ def followed(
         _follow(active, True, world, paths, workers, job)
         active = active[paths.material[active] >= 0]
         if sources.before is not None:
-            workers.run(len(active), CHUNK, end, job)
-        return paths.radiance
+            cell = np.empty(len(active), np.int64)
 
-    def differ(start: int, stop: int) -> None:
-        told = (sources.light.matte, *tables, sources.light.functions)
-        every: Any = (rays.vertex, rays.cell, *told, change)
-        subtract_sent(start, stop, row, ray, *every)
+            def look_back(start: int, stop: int) -> None:
+                cells_back(start, stop, active, *frames, paths.vertex, paths.direction, cell)
+
+            workers.run(len(active), CHUNK, look_back, job)
+            met = paths.vertex[active].astype(np.int64)
+            sent = sent_towards(sources.before, surface, met, cell, workers, job)
+            paths.radiance[active] += paths.throughput[active] * sent
+        return paths.radiance
 
     for first in range(0, len(row), AT_ONCE):
         part = slice(first, min(first + AT_ONCE, len(row)))
         for sample in range(samples):
             job.checkpoint(first * samples, len(row) * samples)
             change[part] += along(part, seed + sample) / np.float32(samples)
-    workers.run(len(row), CHUNK, differ, job)
+    told = (rays.vertex[row, ray].astype(np.int64), rays.cell[row, ray].astype(np.int64))
+    change -= sent_towards(sources.light, surface, *told, workers, job)
     return Near(row, ray, change)
 
 
@@ -209,86 +205,21 @@ def begin_near(
 
 
 @kernel
-def end_near(
-    start: int,
-    stop: int,
-    active: I64,
-    normals: F32,
-    tangents: F32,
-    matte: F32,
-    slot: I64,
-    row: I32,
-    base: I64,
-    count: I64,
-    outgoing: F32,
-    functions: F32,
-    paths: Paths,
+def cells_back(
+    start: int, stop: int, active: I64, normals: F32, tangents: F32, vertex: I32, direction: F32, out: I64
 ) -> None:
-    """Adds what vertices send to paths active[start:stop] where they ended, and ends them."""
+    """out (A,): from which cell of the vertex that was met paths active[start:stop] came."""
     axes = np.empty((3, 3))
     for i in range(start, stop):
         n = active[i]
-        v = np.int64(paths.vertex[n])
-        r, g, b = matte[v, 0], matte[v, 1], matte[v, 2]
-        source = slot[v]
-        if source >= 0:
-            surface_frame(normals[v], tangents[v], axes)
-            x, y, z = paths.direction[n, 0], paths.direction[n, 1], paths.direction[n, 2]
-            cell = cell_of(
-                -(axes[0, 0] * x + axes[0, 1] * y + axes[0, 2] * z),
-                -(axes[1, 0] * x + axes[1, 1] * y + axes[1, 2] * z),
-                -(axes[2, 0] * x + axes[2, 1] * y + axes[2, 2] * z),
-            )
-            its = count[row[v]]
-            at = base[row[v]] + cell * its
-            source *= 3
-            for k in range(its):
-                weight = outgoing[at + k]
-                r += weight * functions[source + k]
-                g += weight * functions[source + its + k]
-                b += weight * functions[source + 2 * its + k]
-            r, g, b = max(r, ZERO), max(g, ZERO), max(b, ZERO)
-        paths.radiance[n, 0] += paths.throughput[n, 0] * r
-        paths.radiance[n, 1] += paths.throughput[n, 1] * g
-        paths.radiance[n, 2] += paths.throughput[n, 2] * b
-        paths.material[n] = ENDED
-
-
-@kernel
-def subtract_sent(
-    start: int,
-    stop: int,
-    rows: I64,
-    rays: I64,
-    hit_vertex: U32,
-    hit_cell: U16,
-    matte: F32,
-    slot: I64,
-    row: I32,
-    base: I64,
-    count: I64,
-    outgoing: F32,
-    functions: F32,
-    out: F32,
-) -> None:
-    """Takes from out (K, 3) what vertices send along the rays start … stop−1."""
-    for n in range(start, stop):
-        v = np.int64(hit_vertex[rows[n], rays[n]])
-        r, g, b = matte[v, 0], matte[v, 1], matte[v, 2]
-        source = slot[v]
-        if source >= 0:
-            its = count[row[v]]
-            at = base[row[v]] + np.int64(hit_cell[rows[n], rays[n]]) * its
-            source *= 3
-            for k in range(its):
-                weight = outgoing[at + k]
-                r += weight * functions[source + k]
-                g += weight * functions[source + its + k]
-                b += weight * functions[source + 2 * its + k]
-            r, g, b = max(r, ZERO), max(g, ZERO), max(b, ZERO)
-        out[n, 0] -= r
-        out[n, 1] -= g
-        out[n, 2] -= b
+        v = np.int64(vertex[n])
+        surface_frame(normals[v], tangents[v], axes)
+        x, y, z = direction[n, 0], direction[n, 1], direction[n, 2]
+        out[i] = cell_of(
+            -(axes[0, 0] * x + axes[0, 1] * y + axes[0, 2] * z),
+            -(axes[1, 0] * x + axes[1, 1] * y + axes[1, 2] * z),
+            -(axes[2, 0] * x + axes[2, 1] * y + axes[2, 2] * z),
+        )
 
 
 def trusted(found: Sequence[tuple[Rays, Near]], vertices: int) -> F32:

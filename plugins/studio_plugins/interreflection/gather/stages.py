@@ -14,6 +14,7 @@ from studio_core.scene.nodes import Light as LightNode
 from studio_core.shading.artifacts import (
     Casters,
     Lighting,
+    Receivers,
     Shapes,
     Surfaces,
 )
@@ -162,6 +163,7 @@ class SentStage:
         Casters,
         Shapes,
         Lighting,
+        Receivers,
         Chosen,
         Separated,
         Reflecting,
@@ -177,11 +179,19 @@ class SentStage:
         self._covered: Kept[Covered] = Kept()
 
     def run(self, frame: Frame, inputs: Inputs, job: Job) -> Sent:
-        """All bounces that were asked for."""
+        """All bounces that were asked for; the previous while somebody only looks around.
+
+        What is seen tells where the sky is looked at from; at rest it may be looked at anew.
+        """
+        previous: Sent | None = inputs.previous
+        looked = inputs.rebuilt == {Receivers} and not inputs.changes.aspects & self.dirtied_by
+        if previous is not None and looked and frame.moving:
+            return previous
         surfaces, shapes, separated = inputs[Surfaces], inputs[Shapes], inputs[Separated]
         tier, params = inputs[Chosen].tier, _params(frame)
         samples = SampleCounts(tier.lamp_samples, tier.environment_samples)
-        counted = self._light.update(surfaces, inputs[Casters], inputs[Lighting], samples, job)
+        seen = inputs[Receivers].seen
+        counted = self._light.update(surfaces, inputs[Casters], inputs[Lighting], samples, job, seen)
         lights = {n.id: n for n in frame.scene.of(LightNode) if frame.scene.shown(n.id)}
         irradiance, slot, functions = self._light.sums(surfaces, shapes, separated, lights, None, job)
         met = inputs[Meetings]
