@@ -15,10 +15,10 @@ import numpy.typing as npt
 from studio_core.kernels.raycast import RayCaster
 from studio_core.kernels.visibility import lifted
 from studio_core.parallel import Checkpoints, Workers
-from studio_core.scene.tessellate import morton_codes
 from studio_core.scene.transform import Transform
 from studio_core.scene.world_mesh import WorldMesh
 from studio_core.shading.artifacts import Casters
+from studio_core.transport.coherence import coherent
 from studio_core.transport.light_kernels import mark_moved, repack, trace_pairs
 from studio_core.transport.light_samples import LightSamples
 
@@ -127,7 +127,7 @@ class LightBits:
             self.seen = np.zeros((count, words), np.uint64)
             self._todo = np.full((count, words), _ALL)
             self._caster, self._rows, self._keys = caster, samples.rows, samples.keys
-            self._order = _order(points)
+            self._order = coherent(points.positions, points.normals).astype(np.int32)
             self._transforms = casters.transforms
             self._bounds = Bounds.of(caster)
         else:
@@ -226,11 +226,3 @@ class LightBits:
         rays = sum(counts)
         self._caster.count(rays)
         return rays, len(points) * len(samples) - rays
-
-
-def _order(points: LitPoints) -> I32:
-    """Points that face alike one after the other, neighbours near each other: their rays go alike."""
-    if not len(points):
-        return np.zeros(0, np.int32)
-    facing = (points.normals > 0) @ np.array([1, 2, 4])
-    return np.lexsort((morton_codes(points.positions.astype(np.float64)), facing)).astype(np.int32)

@@ -10,10 +10,10 @@ import numpy.typing as npt
 
 from studio_core.arrays import readonly
 from studio_core.parallel import Checkpoints, Workers
-from studio_core.scene.tessellate import morton_codes
 from studio_core.scene.world_mesh import WorldMesh
 from studio_core.shading.artifacts import Casters, Surfaces
 from studio_core.transport.cells import CELLS
+from studio_core.transport.coherence import coherent
 from studio_core.transport.hits import BLACK, NOTHING, HitTable
 from studio_core.transport.patterns import Pattern, variants_of
 from studio_core.transport.rows import ARRAYS, Counts, Rows
@@ -52,7 +52,7 @@ class Transport(Rows):
             each = max(self.nbytes // max(len(self.rows), 1), 8 * self._rays)
             if (len(self.rows) + len(missing)) * each > self._limit:
                 self._keep(np.flatnonzero(wanted[self.rows]))
-            missing = missing[_coherent(mesh, missing)]
+            missing = missing[coherent(mesh.positions[missing], mesh.normals[missing])]
             self._append(missing, variants_of(missing, self.pattern.variants))
         some = self.row_of[wanted].astype(np.int64)
         some.sort()
@@ -143,7 +143,7 @@ class RayTransport(Rows):
         table = self.table
         self._clear_rows()
         self._append(rows, np.arange(len(rows), dtype=np.int32))
-        self._order = _coherent(mesh, rows)
+        self._order = coherent(mesh.positions[rows], mesh.normals[rows])
         for name in ARRAYS:
             if name != "variant":
                 getattr(self, name)[same] = before[name][found[same]]
@@ -167,16 +167,6 @@ def _fits(arrays: Mapping[str, npt.NDArray[Any]], mesh: WorldMesh, rays: int) ->
         and (cell[lit] < CELLS).all()
         and (arrays["distance"] >= 0).all()
     )
-
-
-def _coherent(mesh: WorldMesh, vertices: I64) -> I64:
-    """An order of vertices in which neighbours look the same way from about the same place."""
-    if not len(vertices):
-        return np.zeros(0, np.int64)
-    normals = mesh.normals[vertices]
-    axis = np.abs(normals).argmax(axis=1)
-    facing = 2 * axis + (np.take_along_axis(normals, axis[:, None], axis=1)[:, 0] < 0)
-    return np.lexsort((morton_codes(mesh.positions[vertices].astype(np.float64)), facing))
 
 
 __all__ = ["Counts", "RayTransport", "Rows", "Transport"]
