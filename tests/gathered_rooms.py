@@ -65,6 +65,11 @@ class Room:
             made = self.inner.refine(frame, job, handed)
         return made
 
+    def complete(self) -> None:
+        """What is done in idle time."""
+        assert self._marked is not None
+        self.inner.complete(self._marked, Job("idle"))
+
     def handed(self) -> dict[type, Any]:
         """What the method's stages get; everything is seen."""
         found: dict[type, Any] = {k: self._outer.artifact(k) for k in (Surfaces, Casters, Shapes, Lighting)}

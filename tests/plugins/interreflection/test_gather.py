@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -18,6 +19,7 @@ from studio_core.scene.geometry import Image, Texture
 from studio_core.scene.nodes import AreaLamp, Environment, Light, Material, MeshObject, PointLamp, Scene
 from studio_core.scene.transform import Transform, axis_angle, looking
 from studio_core.shading.artifacts import Surfaces
+from studio_core.shading.cache import DiskCache
 from studio_plugins.residual.material import scene_material
 
 LAMP = AreaLamp(
@@ -151,3 +153,20 @@ def test_less_is_asked_for_with_a_larger_tolerance(services: Services) -> None:
     counts = [room.light(moving=False, tolerance=t).facts["rays"] for t in (10.0, 3.0, 1.5)]
     assert counts == sorted(counts)
     assert counts[0] < counts[1] < counts[2]
+
+
+def test_rays_of_all_vertices_are_found_again_on_disk(services: Services, tmp_path: Path) -> None:
+    kept = dataclasses.replace(services, cache=DiskCache(tmp_path))
+    scene = furnished((LAMP,), GLOSSY)
+    first = Room(scene, kept)
+    made = first.light()
+    first.complete()
+    again = Room(scene, kept).light()
+    assert made.counts["rays_between_vertices"] > 0
+    assert again.counts["rays_between_vertices"] == 0
+    np.testing.assert_array_equal(again.layer.irradiance, made.layer.irradiance)
+    box = scene["box"]
+    assert isinstance(box, MeshObject)
+    elsewhere = dataclasses.replace(box, transform=Transform((0.5, 0.5, 0.5)))
+    moved = Room(scene.with_nodes(elsewhere), kept).light()
+    assert moved.counts["rays_between_vertices"] > 0

@@ -37,6 +37,7 @@ I64 = npt.NDArray[np.int64]
 Bools = npt.NDArray[np.bool_]
 CHUNK = 1 << 9
 COVERED = 0.5  # share of rays that meet insides, above which a vertex counts as covered
+KEPT = "rays of all vertices"
 INNER_SEED, FINAL_SEED = 1000, 2000  # apart: what receivers meet must not be what chose the sources' light
 
 
@@ -97,14 +98,34 @@ class MeetingsStage:
     dirtied_by = Aspect.NONE
 
     def __init__(self, services: Services) -> None:
-        self._workers = services.workers
+        self._cache = services.cache
         self._tables = Tables(services, INNER_SEED)
+        self._casters: Casters | None = None
+        self._on_disk: tuple[object, ...] = ()
 
     def run(self, frame: Frame, inputs: Inputs, job: Job) -> Meetings:
-        """Tables brought up to date."""
-        surfaces = inputs[Surfaces]
+        """Tables brought up to date; the first time what is kept on disk is taken over."""
+        surfaces, casters, counts = inputs[Surfaces], inputs[Casters], inputs[Chosen].tier.inner
+        if self._casters is None and self._cache is not None:
+            table = self._tables.of(0, counts[0])
+            kept = self._cache.get(KEPT, *table.key(casters))
+            if kept is not None and table.from_arrays(surfaces, casters, kept):
+                self._on_disk = casters.meshes
+        self._casters = casters
         every = np.ones(len(surfaces.mesh.positions), np.bool_)
-        return self._tables(inputs[Chosen].tier.inner, surfaces, inputs[Casters], every, inputs.previous, job)
+        return self._tables(counts, surfaces, casters, every, inputs.previous, job)
+
+    def complete(self, frame: Frame, job: Job) -> None:
+        """Keeps the rays of the first tier on disk, for the next time this scene is opened.
+
+        Once for the same meshes: not every pose of a long day.
+        """
+        if self._cache is None or self._casters is None or not len(self._tables.of(0).rows):
+            return
+        table = self._tables.of(0)
+        if self._on_disk != self._casters.meshes:
+            self._cache.put(table.to_arrays(), KEPT, *table.key(self._casters))
+            self._on_disk = self._casters.meshes
 
 
 class Tables:
@@ -127,10 +148,7 @@ class Tables:
         """Those of a tier; finer ones wait for theirs."""
         tables, rays, changed = [], 0, False
         for index, count in enumerate(counts):
-            if index not in self._held:
-                pattern = cosine_pattern(count, seed=self._seed + index)
-                self._held[index] = Transport(self._workers, pattern)
-            table = self._held[index]
+            table = self.of(index, count)
             done = table.update(surfaces, casters, wanted, job)
             rays += done.rays
             changed |= done.rays > 0 or bool(table.touched.any())
@@ -138,6 +156,13 @@ class Tables:
         if previous is not None and not changed and previous.tables == tuple(tables):
             return previous
         return Meetings(tuple(tables), previous.number + 1 if previous is not None else 1, rays)
+
+    def of(self, index: int, count: int = 0) -> Transport:
+        """The table of a tier, made with `count` rays where there is none."""
+        if index not in self._held:
+            pattern = cosine_pattern(count, seed=self._seed + index)
+            self._held[index] = Transport(self._workers, pattern)
+        return self._held[index]
 
     @property
     def nbytes(self) -> int:
