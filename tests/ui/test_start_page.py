@@ -114,7 +114,7 @@ def test_samples_open_as_copies(make: Make) -> None:
     driver = make()
     driver.do("file.new")
     cards = page(driver).samples.cards
-    assert [card.text() for card in cards] == ["Living room", "Captured room", "Terrace"]
+    assert [card.text() for card in cards] == ["Living room", "Captured room", "Red cabinet", "Terrace"]
     assert all(card.image is not None for card in cards)
     cards[2].click()
     driver.until(lambda: bool(driver.document.scene.nodes))
