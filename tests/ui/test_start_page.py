@@ -116,7 +116,7 @@ def test_samples_open_as_copies(make: Make) -> None:
     cards = page(driver).samples.cards
     assert [card.text() for card in cards] == ["Living room", "Captured room", "Red cabinet", "Terrace"]
     assert all(card.image is not None for card in cards)
-    cards[2].click()
+    cards[3].click()
     driver.until(lambda: bool(driver.document.scene.nodes))
     assert driver.window.files.path is None
     assert driver.window.files.name == "Terrace"
