@@ -52,8 +52,6 @@ STILL = 4
 """Samples across and up a pixel of pictures at rest."""
 MOST = 0.98
 """Share of the places that are left where the worst are left out."""
-SURER = 8
-"""Times as many paths where tints are judged."""
 TIERS = ("moving", "rest")
 
 
@@ -68,7 +66,7 @@ class Setup:
     height: int = 540
     poses: int = 20
     places: int = 500
-    paths: int = 512
+    paths: int = 4096
     edits: int = 9
     peer: tuple[int, int] = (480, 270)
     samples: tuple[int, ...] = (4, 16, 64)
@@ -82,7 +80,7 @@ QUICK = Setup(
     height=135,
     poses=2,
     places=120,
-    paths=256,
+    paths=1024,
     edits=3,
     peer=(120, 68),
     samples=(4, 16),
@@ -197,7 +195,7 @@ class Case:
         editor = self.editor("shared")
         tracer = TruthTracer(
             self.program.services,
-            self.setup.paths * (SURER if self.one.tinted else 1),
+            self.setup.paths,
             BOUNCES,
             None if self.setup.cache is None else DiskCache(self.setup.cache),
         )
