@@ -68,10 +68,10 @@ class PluginShading:
         return Pipeline([*stages, PictureStage(self._services)])
 
     def measure(self, pipeline: Pipeline, frame: Frame, job: Job) -> MeasuredError | None:
-        """The error of what the pipeline last made."""
-        from studio_core.shading.error_meter import ErrorMeter
+        """The error of what the pipeline last made; surer each time it is asked for."""
+        from studio_core.shading.error_meter import ErrorMeter, SteadyMeter
 
-        self._meter = self._meter or ErrorMeter(self._services)
+        self._meter = self._meter or SteadyMeter(ErrorMeter(self._services))
         found: MeasuredError | None = self._meter(pipeline, frame, job)
         return found
 

@@ -20,7 +20,6 @@ from studio_core.raster import Coefficients, CoefficientTable, Compositor
 from studio_core.scene.nodes import Light, NodeId
 from studio_core.shading.artifacts import (
     Casters,
-    Error,
     Hits,
     LayerRadiance,
     Lighting,
@@ -30,6 +29,7 @@ from studio_core.shading.artifacts import (
     Shapes,
 )
 from studio_core.shading.brute_force import VisibilityBits, all_points, environment_layer, lamp_layer
+from studio_core.shading.compared import Compared, Looked
 from studio_core.shading.frame import Frame
 from studio_core.shading.job import Job
 from studio_core.shading.path_tracing import PathSettings, bounces_of, chosen_points, indirect_halves
@@ -42,35 +42,10 @@ F32 = npt.NDArray[np.float32]
 F64 = npt.NDArray[np.float64]
 LEVEL = 15
 LAMP_SAMPLES = 256
-RESAMPLINGS = 200
 PATHS = 1024
 """Paths a place, where light between surfaces is measured."""
 SEEDS = 1_000_003
 """Where the numbers of these begin: far from those of path traced light that is shown."""
-
-
-def compare(
-    shown: npt.ArrayLike, true: npt.ArrayLike, seed: int = 0, again: npt.ArrayLike | None = None
-) -> Error:
-    """The error of (N, 3) radiance; its standard error by bootstrap over the places.
-
-    All is relative to the mean of what is true. Where that is black and what is shown is not, it is relative
-    to the mean of what is shown: at least 1, as if all of it were wrong. With `again`, `true` and it are two
-    independent estimates of the truth whose noise does not count, but for the percentile.
-    """
-    a, b = np.asarray(shown, np.float64), np.asarray(true, np.float64)
-    c = b if again is None else np.asarray(again, np.float64)
-    truth = (b + c) / 2
-    relative_to = truth if truth.any() else a
-    if not relative_to.any():
-        return Error(0.0, 0.0, len(b))
-    squares, means = ((a - b) * (a - c)).mean(axis=1), relative_to.mean(axis=1)
-    drawn = np.random.default_rng(seed).integers(0, len(b), (RESAMPLINGS, len(b)))
-    redrawn = np.sqrt(np.maximum(squares[drawn].mean(axis=1), 0))
-    redrawn /= np.maximum(means[drawn].mean(axis=1), 1e-30)
-    worst = np.percentile(np.abs(a - truth).mean(axis=1), 99) / means.mean()
-    found = float(np.sqrt(max(squares.mean(), 0)) / means.mean())
-    return Error(found, float(redrawn.std()), len(b), float(worst))
 
 
 class ErrorMeter:
@@ -89,9 +64,18 @@ class ErrorMeter:
     ) -> MeasuredError | None:
         """Errors of the pipeline's radiance for `frame`; None where nothing opaque is seen.
 
+        With more `places` the errors are surer: their standard error says how sure.
+        """
+        looked = self.look(pipeline, frame, job, places)
+        return None if looked is None else looked.error()
+
+    def look(
+        self, pipeline: Pipeline, frame: Frame, job: Job, places: int | None = None, number: int = 0
+    ) -> Looked | None:
+        """What is shown and what is true at random places; with another `number` at others.
+
         Light between surfaces is compared with as many bounces as the frame asks for. Layers that brute force
-        does not make are left out on both sides. With more `places` the errors are surer: their standard
-        error says how sure.
+        does not make are left out on both sides.
         """
         radiance, shapes = pipeline.artifact(Radiance), pipeline.artifact(Shapes)
         lighting, casters = pipeline.artifact(Lighting), pipeline.artifact(Casters)
@@ -103,7 +87,7 @@ class ErrorMeter:
         known = {node: layer for node, layer in radiance.layers.items() if node in lighting.layers}
         radiance = dataclasses.replace(radiance, layers=known)
         places = self._places if places is None else places
-        rng = np.random.default_rng(frame.revision)
+        rng = np.random.default_rng((frame.revision, number))
         surfaces, mesh = radiance.surfaces, radiance.surfaces.mesh
         hit = np.flatnonzero(hits.face >= 0)
         candidates = hit[surfaces.opacity[mesh.face_material[hits.face[hit]]] >= 1]
@@ -128,7 +112,7 @@ class ErrorMeter:
             gain = np.asarray(lights[layer].gain() if layer in lights else (0, 0, 0), np.float32)
             true_layers[layer] = (truth[layer].terms * looks).sum(axis=1) * gain
             true_layers[layer][caught] = truth[layer].irradiance[caught] * gain * albedo
-        by_layer = {k: compare(shown_layers[k], np.maximum(true_layers[k], 0)) for k in shown_layers}
+        by_layer = {k: Compared(shown_layers[k], np.maximum(true_layers[k], 0)) for k in shown_layers}
         # What is below 0 is cut off once all light is summed.
         shown = self._compositor.radiance(frame.scene, radiance, seen, table, job, chosen)
         straight = sum(true_layers.values(), np.zeros((len(chosen), 3), np.float32))
@@ -142,11 +126,11 @@ class ErrorMeter:
                 halves[-1][caught] = half.irradiance[caught] * albedo
             alone = dataclasses.replace(radiance, layers={}, pixel=None)
             light = self._compositor.radiance(frame.scene, alone, seen, table, job, chosen)
-            indirect = compare(light, halves[0], again=halves[1])
+            indirect = Compared(light, halves[0], halves[1])
             true, again = straight + halves[0], straight + halves[1]
-        picture = compare(shown, np.maximum(true, 0), again=np.maximum(again, 0))
+        picture = Compared(shown, np.maximum(true, 0), np.maximum(again, 0))
         vertices = self._vertices(radiance, shapes, lighting, casters, world, frame, table, rng, places, job)
-        return MeasuredError(picture, vertices, by_layer, indirect)
+        return Looked(picture, vertices, by_layer, indirect)
 
     def _vertices(
         self,
@@ -160,7 +144,7 @@ class ErrorMeter:
         rng: np.random.Generator,
         places: int,
         job: Job,
-    ) -> Error:
+    ) -> Compared:
         mesh = radiance.surfaces.mesh
         valid = np.flatnonzero(radiance.valid)
         some = np.sort(rng.choice(valid, min(places, len(valid)), replace=False))
@@ -176,10 +160,10 @@ class ErrorMeter:
         if truth:
             straight = (exact.combined(lights) * looks).sum(axis=1)
         if world is None:
-            return compare(shown, straight)
+            return Compared(shown, straight)
         halves = self._bounced(points, points, own, world, frame, job)
         one, other = (straight + (half.terms * looks).sum(axis=1) for half in halves)
-        return compare(shown, one, again=other)
+        return Compared(shown, one, other)
 
     def _bounced(
         self,
@@ -221,6 +205,27 @@ class ErrorMeter:
                 facing, shapes, lighting, bits, eye, every, LEVEL, self._workers, job
             )
         return made
+
+
+class SteadyMeter:
+    """Looks at more places of the same picture each time it is asked, until the error is sure."""
+
+    def __init__(self, meter: ErrorMeter) -> None:
+        self._meter = meter
+        self._of: Radiance | None = None
+        self._looked: Looked | None = None
+        self._number = 0
+
+    def __call__(self, pipeline: Pipeline, frame: Frame, job: Job) -> MeasuredError | None:
+        """The error by all places so far; None where nothing opaque is seen."""
+        radiance = pipeline.artifact(Radiance)
+        if radiance is not self._of:
+            self._of, self._looked, self._number = radiance, None, 0
+        more = self._meter.look(pipeline, frame, job, number=self._number)
+        self._number += 1
+        if more is not None:
+            self._looked = more if self._looked is None else self._looked + more
+        return None if self._looked is None else self._looked.error()
 
 
 def _lights(frame: Frame) -> dict[NodeId, Light]:

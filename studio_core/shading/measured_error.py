@@ -8,6 +8,9 @@ from dataclasses import dataclass, field
 
 from studio_core.scene.nodes import NodeId
 
+SURE, NEGLIGIBLE, ENOUGH = 0.15, 0.002, 2048
+"""An error is sure when its uncertainty is that share of it, or that little, or by so many places."""
+
 
 @dataclass(frozen=True)
 class Error:
@@ -21,6 +24,12 @@ class Error:
     places: int
     p99: float = 0.0
 
+    @property
+    def sure(self) -> bool:
+        """Whether more places would tell little more."""
+        close = max(SURE * self.relative_rmse, NEGLIGIBLE)
+        return self.uncertainty <= close or self.places >= ENOUGH
+
     def __str__(self) -> str:
         return f"{100 * self.relative_rmse:.1f} ± {100 * self.uncertainty:.1f} %"
 
@@ -33,6 +42,11 @@ class MeasuredError:
     vertices: Error
     layers: Mapping[NodeId, Error] = field(default_factory=dict)
     indirect: Error | None = None
+
+    @property
+    def sure(self) -> bool:
+        """Whether that of the picture is."""
+        return self.picture.sure
 
     def as_dict(self) -> dict[str, object]:
         """For --json."""

@@ -106,6 +106,7 @@ class _Spare:
     label: str
     work: Callable[[Frame, Job], Any]
     done: Callable[[Frame, Any], None] | None
+    again: Callable[[Any], bool] = lambda result: False
 
 
 class Scheduler:
@@ -116,7 +117,8 @@ class Scheduler:
 
     `spare(pipeline, frame, job)` is run when a frame is finished and nothing waits, such as the error
     meter; its result comes as `measured(frame, result)`. If it `completes`, the pipeline then does what no
-    picture needs yet. Any request cancels either.
+    picture needs yet; after that the spare runs `again` while its result asks for it. Any request cancels
+    either.
     """
 
     def __init__(
@@ -127,6 +129,7 @@ class Scheduler:
         label: str = "Shading",
         spare: Callable[[Pipeline, Frame, Job], Any] | None = None,
         completes: bool = False,
+        again: Callable[[Any], bool] = lambda result: False,
     ) -> None:
         self.shown: Signal[[Frame, Any, bool]] = Signal()
         self.failed: Signal[[Frame, Exception]] = Signal()
@@ -146,6 +149,7 @@ class Scheduler:
         self._closed = False
         self._spare = spare
         self._completes = completes
+        self._again = again
         self._spare_job: Job | None = None
 
     @property
@@ -247,19 +251,21 @@ class Scheduler:
                     step.done(frame, result)
             finally:  # a receiver may have asked for something
                 if idle and self._waiting is None and self._job is None:
-                    self._spare_time(frame, rest)
+                    more = (step,) if step.again(result) else ()
+                    self._spare_time(frame, (*rest, *more))
                 else:
                     self._go_on()
 
         self._executor.submit(run)
 
     def _spare_steps(self) -> tuple[_Spare, ...]:
-        spare = self._spare
-        steps = []
+        steps, spare = [], self._spare
         if spare is not None:
-            steps.append(
-                _Spare("Measuring the error", lambda f, j: spare(self.pipeline, f, j), self.measured.emit)
-            )
+
+            def measure(frame: Frame, job: Job) -> Any:
+                return spare(self.pipeline, frame, job)
+
+            steps.append(_Spare("Measuring the error", measure, self.measured.emit, self._again))
         if self._completes:
             steps.append(_Spare("Looking at hidden places", self.pipeline.complete, None))
         return tuple(steps)

@@ -263,7 +263,8 @@ class PictureFeed:
 
     def _schedule(self) -> Scheduler:
         pipeline: Any = LazyPipeline(self._shading, self._backend)
-        scheduler = Scheduler(pipeline, self._executor, self._post, spare=self._spare, completes=True)
+        given = (pipeline, self._executor, self._post)
+        scheduler = Scheduler(*given, spare=self._spare, completes=True, again=_unsure)
         scheduler.shown.connect(self._show)
         scheduler.failed.connect(self._fail)
         scheduler.progress.connect(self.progress.emit)
@@ -393,3 +394,7 @@ class PictureFeed:
         if state is not self.state:
             self.state = state
             self.freshness.emit(state)
+
+
+def _unsure(error: MeasuredError | None) -> bool:
+    return error is not None and not error.sure

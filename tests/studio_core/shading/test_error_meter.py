@@ -6,8 +6,6 @@ import dataclasses
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 from scenes import sky
 
 from studio_core.contract import Services
@@ -17,7 +15,7 @@ from studio_core.scene.geometry import Image
 from studio_core.scene.nodes import Environment, PointLamp, Scene
 from studio_core.scene.transform import Transform
 from studio_core.shading.artifacts import Hits, Lighting, Picture, Radiance
-from studio_core.shading.error_meter import ErrorMeter, compare
+from studio_core.shading.error_meter import ErrorMeter, SteadyMeter
 from studio_core.shading.frame import Frame
 from studio_core.shading.job import Job
 from studio_core.shading.offline import backend_params, scene_view
@@ -37,48 +35,6 @@ def measured(scene, services, host, *, places=300, fine=False, **values):
     frame = Frame(scene, view, params, 1)
     made = pipeline.update(frame, Changes(), Job("shade"))
     return ErrorMeter(services, places)(pipeline, frame, Job("measure")), made, pipeline, frame
-
-
-@given(st.floats(0.1, 10), st.floats(-0.5, 0.5), st.integers(1, 50))
-def test_a_constant_factor_is_its_own_error(level, wrong, count):
-    true = np.full((count, 3), level)
-    assert compare(true * (1 + wrong), true).relative_rmse == pytest.approx(abs(wrong), abs=1e-12)
-
-
-def test_the_stated_uncertainty_covers_the_scatter():
-    rng = np.random.default_rng(0)
-    errors = []
-    for trial in range(60):
-        true = rng.uniform(0.5, 1.5, (200, 3))
-        errors.append(compare(true + rng.normal(0, 0.1, true.shape), true, trial))
-    scatter = np.std([e.relative_rmse for e in errors])
-    assert 0.5 * scatter < np.mean([e.uncertainty for e in errors]) < 2 * scatter
-
-
-def test_nothing_to_compare_is_no_error():
-    for count in (0, 5):
-        made = compare(np.zeros((count, 3)), np.zeros((count, 3)))
-        assert (made.relative_rmse, made.uncertainty, made.p99, made.places) == (0, 0, 0, count)
-
-
-@given(st.floats(1e-4, 1e6), st.integers(1, 50))
-def test_light_where_there_is_none_is_all_wrong(level, count):
-    made = compare(np.full((count, 3), level), np.zeros((count, 3)))
-    assert made.relative_rmse == pytest.approx(1)
-    assert made.p99 == pytest.approx(1)
-    spot = np.zeros((count + 1, 3))
-    spot[0] = level
-    assert compare(spot, np.zeros((count + 1, 3))).relative_rmse > 1
-
-
-def test_a_few_bad_places_show_in_the_percentile():
-    true = np.ones((1000, 3))
-    shown = true.copy()
-    shown[:15] += 0.5
-    made = compare(shown, true)
-    assert made.p99 == pytest.approx(0.5)
-    shown[10:15] = 1
-    assert compare(shown, true).p99 < 0.5
 
 
 def test_brute_force_has_no_error_at_its_vertices(services, host, little_scene):
@@ -187,3 +143,24 @@ def test_an_empty_picture_has_no_error_to_measure(services, host, little_scene):
     scene = Scene()
     meter, _, _, _ = measured(scene, services, host)
     assert meter is None
+
+
+def test_each_further_look_is_at_other_places_of_the_same_picture(services, host, little_scene):
+    once, _, pipeline, frame = measured(little_scene(), services, host, places=100)
+    meter = SteadyMeter(ErrorMeter(services, 100))
+    made = [meter(pipeline, frame, Job("measure")) for _ in range(4)]
+    assert made[0] == once
+    assert [one.picture.places for one in made] == [100, 200, 300, 400]
+    assert [one.vertices.places for one in made] == [100, 200, 300, 400]
+    assert len({one.picture.relative_rmse for one in made}) == 4
+    every, _, _, _ = measured(little_scene(), services, host, places=10**9)
+    off = abs(made[-1].picture.relative_rmse - every.picture.relative_rmse)
+    assert off < 4 * made[-1].picture.uncertainty + 1e-4
+
+
+def test_another_picture_is_looked_at_anew(services, host, little_scene):
+    _, _, pipeline, frame = measured(little_scene(), services, host, places=50)
+    meter = SteadyMeter(ErrorMeter(services, 50))
+    meter(pipeline, frame, Job("measure"))
+    _, _, other, later = measured(little_scene(), services, host, places=50, directions="1024")
+    assert meter(other, later, Job("measure")).picture.places == 50

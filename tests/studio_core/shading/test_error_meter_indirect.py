@@ -18,7 +18,8 @@ from studio_core.scene.nodes import Camera, Material, PointLamp
 from studio_core.scene.transform import Transform, looking
 from studio_core.session import INDIRECT
 from studio_core.shading.artifacts import Radiance
-from studio_core.shading.error_meter import ErrorMeter, compare
+from studio_core.shading.compared import compare
+from studio_core.shading.error_meter import ErrorMeter
 from studio_core.shading.frame import Frame
 from studio_core.shading.indirect import with_indirect
 from studio_core.shading.job import Job

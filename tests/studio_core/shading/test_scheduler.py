@@ -268,6 +268,29 @@ def test_whatever_the_spare_work_does_the_next_request_runs(error: BaseException
     assert not scheduler.busy
 
 
+def test_spare_work_goes_on_after_everything_else_until_its_result_is_enough() -> None:
+    bench = Bench()
+    done: list[str] = []
+
+    class Completing(Pipeline):
+        def complete(self, frame: Frame, job: Job) -> None:
+            done.append("hidden")
+
+    def spare(pipeline: Pipeline, frame: Frame, job: Job) -> int:
+        done.append("measured")
+        return done.count("measured")
+
+    given = (Completing(bench.stages), bench.executor)
+    scheduler = Scheduler(*given, spare=spare, completes=True, again=lambda result: result < 3)
+    measured: list[object] = []
+    scheduler.measured.connect(lambda _, result: measured.append(result))
+    scheduler.request(Frame(bench.scene, bench.view, None), Changes())
+    bench.executor.drain()
+    assert done == ["measured", "hidden", "measured", "measured"]
+    assert measured == [1, 2, 3]
+    assert not scheduler.busy
+
+
 def test_a_receiver_that_fails_does_not_stop_what_waits(bench: Bench) -> None:
     def fails(*_: object) -> None:
         raise ZeroDivisionError("a bug in a panel")
