@@ -52,7 +52,7 @@ class ActionSet:
         action = QAction(spec.text, owner)
         action.setStatusTip(spec.tip)
         action.setCheckable(spec.checkable)
-        action.setIconVisibleInMenu(not spec.group)  # there the check mark tells
+        action.setIconVisibleInMenu(not spec.checkable)  # there the check mark tells
 
         def run(checked: bool = False) -> None:
             handler()
