@@ -165,10 +165,13 @@ def _uncover(received: Light, surface: Surface) -> None:
 def received(
     sent: Light, tables: Sequence[KeptRays], surface: Surface, workers: Workers, job: Job | None = None
 ) -> Light:
-    """What vertices receive of what others send, over all rays of all tables."""
+    """What vertices receive of what others send: means over all the rays that each has in any table."""
     made = Light(np.zeros_like(sent.matte), np.zeros((surface.size, 3), np.float32))
     known = surface.separated
-    scale = np.pi / sum(table.table.vertex.shape[1] for table in tables)
+    many = np.zeros(len(sent.matte), np.float32)
+    for table in tables:
+        many[table.rows] += table.table.rays
+    scale = np.asarray(np.pi / np.maximum(many, 1), np.float32)
     for table in tables:
         hits = table.table
 

@@ -29,7 +29,7 @@ MOST = 256  # functions of a vertex
 def gather_bounce(
     start: int,
     stop: int,
-    scale: float,
+    scale: F32,
     rows: I64,
     variant: I32,
     hit_vertex: U32,
@@ -48,9 +48,9 @@ def gather_bounce(
 ) -> None:
     """Adds to receivers rows[start:stop]: irradiance (V, 3), and received (S, 3) = Σ rays · h_k.
 
-    hit_vertex, hit_cell (R, N) of cosine-distributed rays of weight `scale` (π over how many there are in
-    all); ray_cell (P, N) the cells of the rays of every variant of the pattern, in the receiver's frame, and
-    variant (R,) the one of each row;
+    hit_vertex, hit_cell (R, N) of cosine-distributed rays; scale (V,) is what one ray of a vertex weighs, π
+    over how many it has in all; ray_cell (P, N) the cells of the rays of every variant of the pattern, in the
+    receiver's frame, and variant (R,) the one of each row;
     matte (V, 3), functions (3 S,) what vertices send; slot (V,) where a vertex' functions start in S, or −1;
     row (V,) its row of the separated BRDFs, whose functions are base, count, outgoing and incoming.
     """
@@ -91,13 +91,14 @@ def gather_bounce(
                     sums[0, k] += weight * r
                     sums[1, k] += weight * g
                     sums[2, k] += weight * b
-        irradiance[receiver, 0] += red * scale
-        irradiance[receiver, 1] += green * scale
-        irradiance[receiver, 2] += blue * scale
+        each = scale[receiver]
+        irradiance[receiver, 0] += red * each
+        irradiance[receiver, 1] += green * each
+        irradiance[receiver, 2] += blue * each
         for k in range(many):
-            received[first + k, 0] += sums[0, k] * scale
-            received[first + k, 1] += sums[1, k] * scale
-            received[first + k, 2] += sums[2, k] * scale
+            received[first + k, 0] += sums[0, k] * each
+            received[first + k, 1] += sums[1, k] * each
+            received[first + k, 2] += sums[2, k] * each
 
 
 @kernel

@@ -77,6 +77,8 @@ class LightSamples:
 
 def joined(parts: Sequence[LightSamples], rows: int) -> LightSamples:
     """Several lights' samples in one list, all of so many rows."""
+    if len(parts) == 1:
+        return parts[0]
     if not parts:
         none = np.zeros((rows, 0, 4))
         return LightSamples(

@@ -60,6 +60,12 @@ class Transport(Rows):
         self._ended = True
         return made
 
+    def keep_only(self, wanted: Bools) -> None:
+        """Forgets the rows of vertices that are not among the wanted (V,) of the last update's meshes."""
+        some = np.flatnonzero(wanted[self.rows])
+        if len(some) < len(self.rows):
+            self._keep(some)
+
     # -- to keep elsewhere -------------------------------------------------------------------------
 
     def key(self, casters: Casters) -> tuple[object, ...]:

@@ -34,17 +34,24 @@ from studio_core.shading.pyramids import Pyramid
 
 F32 = npt.NDArray[np.float32]
 F64 = npt.NDArray[np.float64]
+U16 = npt.NDArray[np.uint16]
 I64 = npt.NDArray[np.int64]
 
 FINEST = 512
+MOST_ROW = 65535
 _PictureKey = tuple[str, bool]
 
 
 @dataclass(frozen=True, eq=False)
 class _Picture:
-    """Levels of at most FINEST texels as rows, and of the whole picture SAMPLED texels and the range."""
+    """Levels of at most FINEST texels, and of the whole picture SAMPLED texels and the range.
 
-    rows: F32
+    A texel is low + step · row, so rows (R, C) take two bytes each and err by 1 / 131,070 of the range.
+    """
+
+    rows: U16
+    low: F32
+    step: F32
     first: I64
     size: I64
     probe: Pyramid
@@ -58,8 +65,14 @@ class _Picture:
         size = np.array([level.shape[:2] for level in levels], np.int64)
         first = np.cumsum([0, *(height * width for height, width in size.tolist())])[:-1].astype(np.int64)
         rows = np.concatenate([level.reshape(-1, texels.shape[2]) for level in levels])
-        probe = Pyramid((some[:, None],), every.min(axis=0), every.max(axis=0))
-        return cls(rows, first, size, probe)
+        low, high = every.min(axis=0), every.max(axis=0)
+        step = np.maximum(high - low, np.float32(1e-30)) / np.float32(MOST_ROW)
+        packed = np.clip(np.rint((rows - low) / step), 0, MOST_ROW).astype(np.uint16)
+        return cls(packed, low, step, first, size, Pyramid((some[:, None],), low, high))
+
+    def texels(self, rows: npt.NDArray[np.number]) -> F32:
+        """What rows (…, C), or means of them, stand for."""
+        return np.asarray(self.low + self.step * rows, np.float32)
 
 
 def _levels(texels: F32) -> list[F32]:
@@ -255,11 +268,8 @@ def _averaged(mesh: WorldMesh, vertices: I64, picture: _Picture, uv_map: F32) ->
             0, len(faces), faces, mesh.positions, mesh.uvs, local, uv_map.astype(np.float64),
             picture.rows, picture.first, picture.size, sums, total,
         )  # fmt: skip
-    mean = picture.rows[-1]
-    made: F32 = np.where(
-        total[:, None] > 0, sums / np.maximum(total, 1e-30)[:, None].astype(np.float32), mean
-    ).astype(np.float32)
-    return made
+    mean = sums / np.maximum(total, 1e-30)[:, None].astype(np.float32)
+    return picture.texels(np.where(total[:, None] > 0, mean, picture.rows[-1]))
 
 
 @kernel
@@ -271,7 +281,7 @@ def add_shares(
     uvs: F32,
     local: npt.NDArray[np.int32],
     uv_map: F64,
-    texels: F32,
+    texels: U16,
     first: I64,
     size: I64,
     sums: F32,

@@ -14,20 +14,19 @@ from typing import Any, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from studio_core.kernels.raycast import CasterHandles
 from studio_core.parallel import Checkpoints, Workers
 from studio_core.scene.nodes import NodeId
-from studio_core.scene.shading_mesh import NO_BACK, ShadingMesh
+from studio_core.scene.shading_mesh import ShadingMesh
 from studio_core.scene.transform import Transform
 from studio_core.scene.world_mesh import WorldMesh
 from studio_core.shading.artifacts import Casters
+from studio_core.transport.face_corners import FaceCorners
 from studio_core.transport.hits import BLACK, GONE, NO_OBJECT, HitTable
 from studio_core.transport.trace_rows import ASKED, COUNTS, TRACED, update_rows
 
 F32 = npt.NDArray[np.float32]
 I32 = npt.NDArray[np.int32]
 I64 = npt.NDArray[np.int64]
-U32 = npt.NDArray[np.uint32]
 Bools = npt.NDArray[np.bool_]
 Poses: TypeAlias = tuple[Transform | None, ...]
 Shape: TypeAlias = tuple[NodeId, ShadingMesh, object]
@@ -70,7 +69,7 @@ class Rows:
         self._poses: dict[int, Poses] = {}
         self._now = NEVER
         self._ended = True
-        self._corners: tuple[I32, U32] | None = None
+        self._corners: FaceCorners | None = None
         self._clear(0)
 
     def _clear(self, vertices: int) -> None:
@@ -227,18 +226,6 @@ class Rows:
         both = zip(self.table.arrays, more.arrays, strict=True)
         self.table = HitTable(*(np.concatenate(pair) for pair in both))
 
-    def _corners_of(self, mesh: WorldMesh, handles: CasterHandles) -> U32:
-        """(slots, 6): vertices of opaque faces, within their object, in the caster's order; kept with it."""
-        if self._corners is None or self._corners[0] is not handles.face_ids:
-            made = np.full((len(handles.face_ids), 6), NO_BACK, np.uint32)
-            for placed, (start, stop) in zip(mesh.objects, handles.face_start.tolist(), strict=True):
-                if start < stop:
-                    ids = handles.face_ids[start:stop]
-                    made[start:stop, :3] = placed.mesh.faces[ids]
-                    made[start:stop, 3:] = placed.mesh.back_faces[ids]
-            self._corners = handles.face_ids, made
-        return self._corners[1]
-
     # -- tracing -----------------------------------------------------------------------------------
 
     def _begin(self) -> None:
@@ -263,6 +250,7 @@ class Rows:
         state, moved_start, moved_items, whole = self._states(self._epoch[todo])
         caster = casters.primary
         handles = caster.handles()
+        self._corners = FaceCorners.of(mesh, handles)
         things = len(mesh.objects)
         part_scene, from_mesh = np.zeros(things, np.int64), np.zeros((things, 3, 4))
         centre, radius = np.zeros((things, 3)), np.zeros(things)
@@ -285,7 +273,7 @@ class Rows:
             *(mesh.positions, frames, mesh.geometric, mesh.inset),
             *(mesh.object, mesh.vertex_offsets, shift, handles.epsilon),
             *(handles.intersect8, handles.occluded8, handles.scene),
-            *(handles.face_start, self._corners_of(mesh, handles), handles.normals),
+            *(handles.face_start, self._corners.table, handles.normals),
             *(part_scene, from_mesh, centre, radius),
             *(table.vertex, table.cell, table.distance.view(np.uint16)),
             *(self._seen, self._holes, self.black, self.touched),

@@ -82,6 +82,19 @@ def test_several_tables_are_one_with_all_their_rays(workers: Workers) -> None:
     np.testing.assert_allclose(both.functions, together, rtol=1e-3, atol=1e-4)
 
 
+def test_each_vertex_has_the_mean_over_the_rays_that_it_has(workers: Workers) -> None:
+    of, sent = surface(1), light(3, surface(1))
+    whole, half = table(4, rays=8), table(5, rays=24)
+    some = np.arange(0, VERTICES, 2)
+    part = SimpleNamespace(
+        rows=half.rows[some], variant=half.variant[some], table=half.table[some], pattern=half.pattern
+    )
+    made, alone = received(sent, [whole, part], of, workers), received(sent, [whole], of, workers)  # type: ignore[list-item]
+    both = received(sent, [whole, half], of, workers)
+    np.testing.assert_allclose(made.matte[some], both.matte[some], rtol=1e-6)
+    np.testing.assert_allclose(made.matte[some + 1], alone.matte[some + 1], rtol=1e-6)
+
+
 def test_what_is_sent_back_is_a_term_times_its_coefficient(workers: Workers) -> None:
     of = surface(6)
     given = light(7, of, sent=False)

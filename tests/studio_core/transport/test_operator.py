@@ -464,3 +464,25 @@ def test_kept_rows_are_taken_over(workers: Workers, tmp_path: Path) -> None:
         assert not taken.from_arrays(stand.surfaces, stand.casters, damaged)
     assert not taken.from_arrays(stand.surfaces, stand.casters, {})
     assert not taken.from_arrays(stand.surfaces, stand.casters, {**found, "cell": found["cell"][:, :8]})
+
+
+def test_operators_of_one_caster_share_its_corners(workers: Workers) -> None:
+    stand = Stand(furnished((0, 0, 0)), 400)
+    one, two = Transport(workers, PATTERN), Transport(workers, cosine_pattern(4))
+    update(one, stand)
+    update(two, stand)
+    assert one._corners is two._corners
+
+
+def test_rows_that_are_forgotten_are_traced_again(workers: Workers) -> None:
+    stand = Stand(furnished((0, 0, 0)), 400)
+    transport = Transport(workers, PATTERN)
+    update(transport, stand)
+    kept = np.arange(len(stand.mesh)) % 2 == 0
+    before = by_vertex(transport)
+    transport.keep_only(kept)
+    np.testing.assert_array_equal(np.sort(transport.rows), np.flatnonzero(kept))
+    assert (transport.row_of[~kept] < 0).all()
+    assert update(transport, stand).rays == 16 * int((~kept).sum())
+    for array, then in zip(by_vertex(transport), before, strict=True):
+        np.testing.assert_array_equal(array, then)

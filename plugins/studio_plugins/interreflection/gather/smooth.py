@@ -63,33 +63,40 @@ class Neighbours:
     """Nearest vertices within each object of a world mesh; by shading mesh, so instances share them."""
 
     def __init__(self) -> None:
-        self._kept: Mapping[int, tuple[ShadingMesh, I32]] = {}
-        self._joined: tuple[tuple[object, ...], I32] | None = None
+        self._parts: tuple[ShadingMesh, ...] = ()
+        self._starts: Mapping[int, int] = {}
+        self._joined = np.zeros((0, NEIGHBOURS), np.int32)
 
     def __call__(self, mesh: WorldMesh) -> I32:
         """(V, NEIGHBOURS) vertices of the world mesh, −1: none."""
         parts = tuple(placed.mesh for placed in mesh.objects)
-        before = self._joined
-        if before is not None and [*map(id, before[0])] == [*map(id, parts)]:
-            return before[1]
-        kept: dict[int, tuple[ShadingMesh, I32]] = {}
-        for part in parts:
-            known = self._kept.get(id(part))
-            if id(part) not in kept:
-                kept[id(part)] = known if known is not None else (part, nearest(part))
-        tables = []
+        if [*map(id, self._parts)] == [*map(id, parts)]:
+            return self._joined
+        made = np.empty((len(mesh), NEIGHBOURS), np.int32)
+        starts: dict[int, int] = {}
         for part, start in zip(parts, mesh.vertex_offsets[:-1].tolist(), strict=True):
-            own = kept[id(part)][1]
-            tables.append(np.where(own >= 0, own + np.int32(start), np.int32(-1)))
-        made = np.concatenate([*tables, np.zeros((0, NEIGHBOURS), np.int32)])
-        self._kept, self._joined = kept, (parts, made)
+            if id(part) in starts:
+                own = _shifted(made, starts[id(part)], start, len(part))
+            elif id(part) in self._starts:
+                own = _shifted(self._joined, self._starts[id(part)], start, len(part))
+            else:
+                own = nearest(part)
+                own[own >= 0] += np.int32(start)
+            made[start : start + len(part)] = own
+            starts[id(part)] = start
+        self._parts, self._starts, self._joined = parts, starts, made
         return made
 
     @property
     def nbytes(self) -> int:
         """Bytes of what is kept."""
-        own = sum(table.nbytes for _, table in self._kept.values())
-        return own + (self._joined[1].nbytes if self._joined is not None else 0)
+        return self._joined.nbytes
+
+
+def _shifted(table: I32, before: int, now: int, count: int) -> I32:
+    """Rows of an object that starts elsewhere now."""
+    own = table[before : before + count]
+    return np.where(own >= 0, own + np.int32(now - before), np.int32(-1))
 
 
 @kernel

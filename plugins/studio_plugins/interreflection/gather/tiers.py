@@ -30,6 +30,15 @@ class Tier:
     follow: int = 0
     last: bool = False
 
+    def sends_as(self, other: Tier) -> bool:
+        """Whether vertices send the same light: what receivers do with it may differ."""
+        return self._of_senders == other._of_senders
+
+    @property
+    def _of_senders(self) -> tuple[object, ...]:
+        samples = self.lamp_samples, self.environment_samples
+        return self.inner, self.functions, self.lobe_error, samples
+
 
 @dataclass(frozen=True)
 class Chosen:
