@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -24,6 +25,9 @@ U16 = npt.NDArray[np.uint16]
 U32 = npt.NDArray[np.uint32]
 CHUNK = 1 << 9
 NO_RAYS = np.zeros((0, 0, 3), np.float32)
+UNTOLD = np.zeros((0, 0), np.float32)
+Hear: TypeAlias = Callable[[I64, F32], object]
+"""Is told of vertices (C,), and the light (C, N) along their rays, colours summed."""
 
 
 class Rays(NamedTuple):
@@ -83,14 +87,25 @@ class Collector:
         return self.shapes.rows(self.mesh)
 
     def add(
-        self, rays: Rays, sending: Sending, needed: I64, way: Facing, terms: F32, irradiance: F32
+        self,
+        rays: Rays,
+        sending: Sending,
+        needed: I64,
+        way: Facing,
+        terms: F32,
+        irradiance: F32,
+        hear: Hear | None = None,
     ) -> None:
-        """Adds terms that are not flat (V, T, 3), and irradiance (V, 3), of the needed vertices."""
+        """Adds terms that are not flat (V, T, 3), and irradiance (V, 3), of the needed vertices.
+
+        `hear` is told of the light along their rays, of some vertices at a time and from any thread.
+        """
         which = rays.row_of[needed].astype(np.int64)
         which = which[which >= 0]
         mesh, shapes, row, lobes = self.mesh, self.shapes, self.row, self.lobes
 
         def run(start: int, stop: int) -> None:
+            along = UNTOLD if hear is None else np.empty((stop - start, rays.vertex.shape[1]), np.float32)
             gather_final(
                 start,
                 stop,
@@ -120,7 +135,10 @@ class Collector:
                 *sending,
                 terms,
                 irradiance,
+                along,
             )
+            if hear is not None:
+                hear(rays.rows[which[start:stop]], along)
 
         self.workers.run(len(which), CHUNK, run, self.job)
 

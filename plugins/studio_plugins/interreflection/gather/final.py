@@ -60,6 +60,7 @@ def gather_final(
     functions: F32,
     out_terms: F32,
     out_irradiance: F32,
+    along: F32,
 ) -> None:
     """Adds terms (V, T, 3) that are not flat, and irradiance (V, 3), of receivers rows[which[start:stop]].
 
@@ -67,10 +68,11 @@ def gather_final(
     row, or, where that is empty, along `world` (R, N, 3). by_cosine = N_c and by_lobes = N_l are how many
     there are of each kind in all; rows without a peaked term have no rays by lobes. Light is weighed as
     surfaces with the leaning normals and tangents do; flat (R, T) are kernels' values that are constant (0:
-    they are not).
+    they are not). along (stop − start, N), unless it is empty, gets the sum
+    over colours of the light along each ray.
     """
     many = hit_vertex.shape[1]
-    drawn = len(world) > 0
+    drawn, telling = len(world) > 0, len(along) > 0
     axes, level = np.empty((3, 3)), np.empty((3, 3))
     wo, level_wo = np.empty(3, np.float32), np.empty(3, np.float32)
     wi, wi_level = np.empty(3 * many, np.float32), np.empty(3 * many, np.float32)
@@ -82,12 +84,16 @@ def gather_final(
         v = rows[i]
         r = row[v]
         if r < 0:
+            if telling:
+                along[n - start] = ZERO
             continue
         surface_frame(normals[v], tangents[v], level)
         surface_frame(leaning_normals[v], leaning_tangents[v], axes)
         some = 0
         for j in range(many):
             vertex = np.int64(hit_vertex[i, j])
+            if telling:
+                along[n - start, j] = ZERO
             if vertex >= BLACK:
                 continue
             red, green, blue = matte[vertex, 0], matte[vertex, 1], matte[vertex, 2]
@@ -116,6 +122,8 @@ def gather_final(
                 continue
             light[0, some], light[1, some], light[2, some] = red, green, blue
             some += 1
+            if telling:
+                along[n - start, j] = red + green + blue
         if some == 0:
             continue
         own = 0

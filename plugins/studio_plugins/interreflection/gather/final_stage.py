@@ -26,11 +26,13 @@ from studio_core.shading.tilting import Facing, facings, gather_tilts
 from studio_core.transport.operator import Transport
 from studio_core.transport.rows import Rows
 from studio_core.transport.separable import Separated
+from studio_plugins.interreflection.gather.carrying import Carry, Layer, Setting
 from studio_plugins.interreflection.gather.collecting import NO_RAYS, Collector, Rays, Sending
+from studio_plugins.interreflection.gather.likeness import Likeness
 from studio_plugins.interreflection.gather.lobe_rays import Drawn, LobeRays
 from studio_plugins.interreflection.gather.near import Near, followed, near_rays, trusted
 from studio_plugins.interreflection.gather.smooth import Neighbours, Spacing, smoothed
-from studio_plugins.interreflection.gather.stages import FINAL_SEED, Meetings, Sent, Tables
+from studio_plugins.interreflection.gather.stages import FINAL_SEED, Meetings, Sent, Tables, method_params
 from studio_plugins.interreflection.gather.tiers import Chosen
 
 F32 = npt.NDArray[np.float32]
@@ -62,6 +64,7 @@ class FinalStage:
         self._lobes = LobeRays(services)
         self._worlds = PathWorlds(services.registry)
         self._neighbours = neighbours
+        self._carry = Carry()
         self._spacing: Kept[Spacing] = Kept()
         self._meetings: Meetings | None = None
 
@@ -81,20 +84,29 @@ class FinalStage:
         neighbours = self._neighbours(mesh)
         sending = Sending.of(sent.sources.light, sent.surface)
         vertices, layer = np.flatnonzero(wanted), blank_layer(mesh, shapes)
-        ways = facings(mesh, shapes, layer)
+        ways, every = facings(mesh, shapes, layer), (*map(_of_pattern, met.tables), *_of_lobes(lobes))
+        hand = not inputs[Chosen].level and not tier.last
+        setting = Setting(frame.scene, mesh, shapes, wanted, method_params(frame))
+        counted = tuple(rays.vertex.shape[1] for rays in every)
+        heard = self._carry.hears(setting, counted, frame.moving) if hand else ()
         for way in ways:
             needed = _needed(vertices, way)
-            for rays in (*map(_of_pattern, met.tables), *_of_lobes(lobes)):
-                collector.add(rays, sending, needed, way, way.terms, way.irradiance)
+            for number, rays in enumerate(every):
+                hear = heard[number] if heard and way is ways[0] else None
+                collector.add(rays, sending, needed, way, way.terms, way.irradiance, hear)
             mask = np.zeros(len(wanted), np.bool_)
             mask[needed] = True
             given = (way.irradiance, met.tables[0], mask, spacing, mesh, neighbours, cosine_rays)
             way.irradiance[:] = smoothed(*given, self._workers, job)
-            collector.add_flat(needed, way.terms, way.irradiance)
+        if heard:
+            self._carry_over(setting, frame.moving, ways, heard)
+        for way in ways:
+            collector.add_flat(_needed(vertices, way), way.terms, way.irradiance)
         near = 0
         if tier.follow:
-            every = (*map(_of_pattern, met.tables), *_of_lobes(lobes))
             near = self._look_closer(frame, inputs, every, collector, ways, vertices, job)
+        if not hand:
+            self._carry.settle(setting, Layer(layer.irradiance, layer.terms), tier.last)
         if layer.tilts is not None:
             gather_tilts(shapes, mesh, ways, layer.tilts)
         counts = {
@@ -104,6 +116,20 @@ class FinalStage:
             "receivers": len(vertices),
         }
         return self._told(inputs, layer, wanted, counts)
+
+    def _carry_over(
+        self, setting: Setting, moving: bool, ways: list[Facing], heard: tuple[Likeness, ...]
+    ) -> None:
+        """To irradiance and terms that are not flat; at rest what is there without it is kept."""
+        layer = Layer(ways[0].irradiance, ways[0].terms)
+        factors = self._carry.factors(setting, layer, heard)
+        if not moving:
+            self._carry.begin(setting, layer, heard)
+        if factors is not None:
+            vertices, by = factors
+            for way in ways:
+                way.irradiance[vertices] *= by.irradiance
+                way.terms[vertices] *= by.terms
 
     def _look_closer(
         self,
@@ -145,7 +171,12 @@ class FinalStage:
             "rays_to_lights": sent.rays if Sent in inputs.rebuilt else 0,
             **counts,
         }
-        held = sum(table.nbytes for table in inner.tables) + self._tables.nbytes + self._lobes.nbytes
+        held = (
+            sum(table.nbytes for table in inner.tables)
+            + self._tables.nbytes
+            + self._lobes.nbytes
+            + self._carry.nbytes
+        )
         separated = inputs[Separated]
         facts = {
             "rays": float(sum(tier.final)),

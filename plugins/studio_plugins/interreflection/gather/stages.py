@@ -119,7 +119,7 @@ class SentStage:
         What is seen tells where the sky is looked at from; at rest it may be looked at anew.
         """
         previous: Sent | None = inputs.previous
-        tier, params = inputs[Chosen].tier, _params(frame)
+        tier, params = inputs[Chosen].tier, method_params(frame)
         if previous is not None and not inputs.changes.aspects & self.dirtied_by:
             looked = inputs.rebuilt == {Receivers} and frame.moving
             if looked or (inputs.rebuilt == {Chosen} and previous.tier.sends_as(tier)):
@@ -157,7 +157,8 @@ def _covered(met: Meetings, surfaces: Surfaces, neighbours: npt.NDArray[np.int32
     return Covered.of(share > COVERED, surfaces.mesh.positions, neighbours)
 
 
-def _params(frame: Frame) -> Any:
+def method_params(frame: Frame) -> Any:
+    """The parameters of this method."""
     assert frame.indirect is not None  # or nobody would run these stages
     return frame.indirect.params
 
@@ -172,4 +173,5 @@ __all__ = [
     "SentStage",
     "SeparateStage",
     "Tables",
+    "method_params",
 ]
