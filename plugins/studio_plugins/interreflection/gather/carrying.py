@@ -20,7 +20,9 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from studio_core.scene.nodes import Scene
+from studio_core.jit import kernel
+from studio_core.scene.nodes import NodeId, Scene
+from studio_core.scene.shading_mesh import ShadingMesh
 from studio_core.scene.world_mesh import WorldMesh
 from studio_core.shading.artifacts import Shapes
 from studio_plugins.interreflection.gather.likeness import Likeness
@@ -35,6 +37,22 @@ LEAST, MOST = 0.1, 2.0
 """Of q."""
 
 
+class Place(NamedTuple):
+    """Objects and their meshes, which number the vertices, and the method's parameters."""
+
+    parts: tuple[tuple[NodeId, ShadingMesh], ...]
+    params: Any
+
+    def same(self, other: Place) -> bool:
+        """Whether vertices have the same numbers, and light is gathered with the same parameters."""
+        pairs = zip(self.parts, other.parts, strict=False)
+        return (
+            self.params == other.params
+            and len(self.parts) == len(other.parts)
+            and all(node == its and mesh is another for (node, mesh), (its, another) in pairs)
+        )
+
+
 class Setting(NamedTuple):
     """What light is gathered in: a scene, its vertices and their BRDFs, whom the picture sees (V,), and the
     method's parameters.
@@ -46,15 +64,19 @@ class Setting(NamedTuple):
     seen: Bools
     params: Any
 
-    def like(self, other: Setting) -> bool:
-        """Whether vertices have the same numbers, and light is gathered with the same parameters."""
-        parts, others = self.mesh.objects, other.mesh.objects
-        return (
-            self.params == other.params
-            and len(parts) == len(others)
-            and all(a.node == b.node and a.mesh is b.mesh for a, b in zip(parts, others, strict=True))
-        )
+    @property
+    def place(self) -> Place:
+        """Where what is found belongs to."""
+        return Place(tuple((placed.node, placed.mesh) for placed in self.mesh.objects), self.params)
 
+    @property
+    def place_of(self) -> I32:
+        """(V,) where a vertex stands among those seen, or −1."""
+        made = np.full(len(self.seen), -1, np.int32)
+        made[self.seen] = np.arange(np.count_nonzero(self.seen), dtype=np.int32)
+        return made
+
+    @property
     def models(self) -> I64:
         """(V,) addresses of the vertices' BRDFs; 0: none."""
         return np.append(self.shapes.address, 0)[self.shapes.rows(self.mesh)]
@@ -73,11 +95,11 @@ class Layer(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Begun:
-    """What the first tier made of a setting at its receivers (C,), and the light along their rays."""
+    """What the first tier made of a scene at receivers (C,), and the light along their rays, packed."""
 
-    setting: Setting
+    scene: Scene
+    place: Place
     vertices: I64
-    place_of: I32
     layer: Layer
     along: tuple[U8, ...]
 
@@ -89,7 +111,7 @@ class Found:
     Of each (C,) the address of its BRDF, and the first tier's irradiance, colours summed.
     """
 
-    setting: Setting
+    place: Place
     place_of: I32
     models: I64
     irradiance: F32
@@ -107,12 +129,12 @@ class Carry:
     @property
     def nbytes(self) -> int:
         """Bytes of what is kept."""
+        begun, found = self._begun, self._found
         kept: list[npt.NDArray[Any]] = []
-        if self._begun is not None:
-            kept += [self._begun.vertices, self._begun.place_of, *self._begun.layer, *self._begun.along]
-        if self._found is not None:
-            found = self._found
-            kept += [found.models, found.irradiance, found.place_of, *found.ratio, *found.along]
+        if begun is not None:
+            kept += [begun.vertices, *begun.layer, *begun.along]
+        if found is not None:
+            kept += [found.place_of, found.models, found.irradiance, *found.ratio, *found.along]
         return sum({id(array): array.nbytes for array in kept}.values())
 
     def hears(self, setting: Setting, rays: tuple[int, ...], moving: bool) -> tuple[Likeness, ...]:
@@ -120,67 +142,62 @@ class Carry:
 
         What belongs to another place is forgotten.
         """
-        if self._found is not None and not self._found.setting.like(setting):
+        if self._found is not None and not self._found.place.same(setting.place):
             self._found = None
-        found, keep_at = self._found, None
-        if not moving:
-            keep_at = np.full(len(setting.seen), -1, np.int32)
-            keep_at[setting.seen] = np.arange(np.count_nonzero(setting.seen), dtype=np.int32)
+        found = self._found
         if found is None and moving:
             return ()
-        then = () if found is None else found.along
+        keep_at = None if moving else setting.place_of
         then_at = None if found is None else found.place_of
-        packed = [*then, *(None for _ in rays)][: len(rays)]
+        then: list[U8 | None] = [*(() if found is None else found.along), *(None for _ in rays)]
         return tuple(
             Likeness(count, one, then_at, keep_at, len(setting.seen))
-            for count, one in zip(rays, packed, strict=True)
+            for count, one in zip(rays, then, strict=False)
         )
 
-    def begin(self, setting: Setting, layer: Layer, heard: tuple[Likeness, ...]) -> None:
-        """At rest: what the first tier made, before anything was carried to it."""
-        vertices = np.flatnonzero(setting.seen)
-        place_of = np.full(len(setting.seen), -1, np.int32)
-        place_of[vertices] = np.arange(len(vertices), dtype=np.int32)
-        along = tuple(one.packed for one in heard)
-        self._begun = Begun(setting, vertices, place_of, layer.at(vertices), along)
+    def over(self, setting: Setting, layers: list[Layer], heard: tuple[Likeness, ...], moving: bool) -> None:
+        """To a first tier's layers, in place: the upright one first, then those that lean each way.
+
+        At rest what is there without it is kept, to be compared with what is finer. `heard` is of the rays
+        by the cosine and, where there are any, of those by lobes.
+        """
+        vertices, found = np.flatnonzero(setting.seen), self._found
+        level = layers[0].irradiance[vertices].sum(axis=1)
+        if not moving:
+            along = tuple(one.packed for one in heard)
+            self._begun = Begun(setting.scene, setting.place, vertices, layers[0].at(vertices), along)
+        if found is None:
+            return
+        place = found.place_of[vertices]
+        there = place >= 0
+        vertices, place, level = vertices[there], place[there], level[there]
+        alike = _alike(level, found.irradiance[place])
+        own, by_lobes = heard[0].of[vertices], heard[-1].of[vertices]
+        by_lobes = np.where(by_lobes < 0, own, by_lobes)
+        by_lobes[setting.models[vertices] != found.models[place]] = 0
+        own, by_lobes = _share(own, alike), _share(by_lobes, alike)
+        as_wide = layers[0].terms.shape[1] == found.ratio.terms.shape[1]
+        for layer in layers:
+            multiply(vertices, place, own, found.ratio.irradiance[:, None], layer.irradiance[:, None])
+            if as_wide:
+                multiply(vertices, place, by_lobes, found.ratio.terms, layer.terms)
 
     def settle(self, setting: Setting, layer: Layer, last: bool) -> None:
         """A finer layer of what was begun: from now on this is carried."""
         begun = self._begun
-        if begun is None or begun.setting.scene is not setting.scene or not begun.setting.like(setting):
+        if begun is None or begun.scene is not setting.scene or not begun.place.same(setting.place):
             return
-        finest = layer.at(begun.vertices)
-        ratio = Layer(*(_ratio(fine, rough) for fine, rough in zip(finest, begun.layer, strict=True)))
-        there = setting.seen[begun.vertices]
-        ratio.irradiance[~there] = 1  # seen no longer: nothing finer was made
-        ratio.terms[~there] = 1
-        models = begun.setting.models()[begun.vertices]
+        vertices = begun.vertices
+        ratio = Layer(*map(_ratio, layer.at(vertices), begun.layer))
+        for sums in ratio:
+            sums[~setting.seen[vertices]] = 1  # seen no longer: nothing finer was made
+        place_of = np.full(len(setting.seen), -1, np.int32)
+        place_of[vertices] = np.arange(len(vertices), dtype=np.int32)
         level = begun.layer.irradiance.sum(axis=1)
-        self._found = Found(begun.setting, begun.place_of, models, level, ratio, begun.along)
+        models = setting.models[vertices]
+        self._found = Found(begun.place, place_of, models, level, ratio, begun.along)
         if last:
             self._begun = None
-
-    def factors(
-        self, setting: Setting, layer: Layer, heard: tuple[Likeness, ...]
-    ) -> tuple[I64, Layer] | None:
-        """Vertices (C,), and what to multiply their irradiance (C, 3) and terms (C, T, 3) with, all positive.
-
-        `heard` is of the rays by the cosine and, where there are any, of those by lobes.
-        """
-        found = self._found
-        if found is None or not heard:
-            return None
-        vertices = np.flatnonzero(setting.seen & (found.place_of >= 0))
-        place = found.place_of[vertices]
-        ratio, level = found.ratio.at(place), layer.irradiance[vertices].sum(axis=1)
-        level = _alike(level, found.irradiance[place])
-        own, by_lobes = (_share(one.of[vertices], level) for one in (heard[0], heard[-1]))
-        irradiance = 1 + own[:, None] * (ratio.irradiance - 1)
-        terms = np.ones((len(vertices), *layer.terms.shape[1:]), np.float32)
-        if terms.shape == ratio.terms.shape:
-            by_lobes[setting.models()[vertices] != found.models[place]] = 0
-            terms += by_lobes[:, None, None] * (ratio.terms - 1)
-        return vertices, Layer(irradiance, terms)
 
 
 def _alike(one: F32, other: F32) -> F32:
@@ -192,11 +209,23 @@ def _alike(one: F32, other: F32) -> F32:
 
 def _share(likeness: F32, alike: F32) -> F32:
     """w of ρ and s."""
-    square = likeness * likeness
+    square = np.maximum(likeness, 0) ** 2
     made = square * alike
     rest = alike + (1 - square) * (1 - alike)
     np.divide(made, rest, out=made, where=rest > 0)
     return made
+
+
+@kernel
+def multiply(vertices: I64, place: I32, share: F32, ratio: F32, sums: F32) -> None:
+    """sums (V, T, 3) of vertices (C,) times 1 + share (ratio[place] − 1), of ratio (B, T, 3)."""
+    for i in range(len(vertices)):
+        if share[i] > 0:
+            for t in range(sums.shape[1]):
+                for c in range(3):
+                    sums[vertices[i], t, c] *= np.float32(1) + share[i] * (
+                        ratio[place[i], t, c] - np.float32(1)
+                    )
 
 
 def _ratio(fine: F32, rough: F32) -> F32:

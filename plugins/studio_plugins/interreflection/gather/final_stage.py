@@ -28,7 +28,6 @@ from studio_core.transport.rows import Rows
 from studio_core.transport.separable import Separated
 from studio_plugins.interreflection.gather.carrying import Carry, Layer, Setting
 from studio_plugins.interreflection.gather.collecting import NO_RAYS, Collector, Rays, Sending
-from studio_plugins.interreflection.gather.likeness import Likeness
 from studio_plugins.interreflection.gather.lobe_rays import Drawn, LobeRays
 from studio_plugins.interreflection.gather.near import Near, followed, near_rays, trusted
 from studio_plugins.interreflection.gather.smooth import Neighbours, Spacing, smoothed
@@ -99,7 +98,8 @@ class FinalStage:
             given = (way.irradiance, met.tables[0], mask, spacing, mesh, neighbours, cosine_rays)
             way.irradiance[:] = smoothed(*given, self._workers, job)
         if heard:
-            self._carry_over(setting, frame.moving, ways, heard)
+            layers = [Layer(way.irradiance, way.terms) for way in ways]
+            self._carry.over(setting, layers, heard, frame.moving)
         for way in ways:
             collector.add_flat(_needed(vertices, way), way.terms, way.irradiance)
         near = 0
@@ -116,20 +116,6 @@ class FinalStage:
             "receivers": len(vertices),
         }
         return self._told(inputs, layer, wanted, counts)
-
-    def _carry_over(
-        self, setting: Setting, moving: bool, ways: list[Facing], heard: tuple[Likeness, ...]
-    ) -> None:
-        """To irradiance and terms that are not flat; at rest what is there without it is kept."""
-        layer = Layer(ways[0].irradiance, ways[0].terms)
-        factors = self._carry.factors(setting, layer, heard)
-        if not moving:
-            self._carry.begin(setting, layer, heard)
-        if factors is not None:
-            vertices, by = factors
-            for way in ways:
-                way.irradiance[vertices] *= by.irradiance
-                way.terms[vertices] *= by.terms
 
     def _look_closer(
         self,

@@ -22,30 +22,34 @@ I32 = npt.NDArray[np.int32]
 I64 = npt.NDArray[np.int64]
 U8 = npt.NDArray[np.uint8]
 
+EVEN = np.float32(1e-6)
+"""Variance of light in squares of its mean below which it counts as the same along all rays."""
+
 
 class Likeness:
     """Hears of the light along one kind of rays: compares it with what it was, keeps it, or both.
 
     `of` (V,) is ρ, at least 0: 0 where nothing is known of then, where either light was the same along all
-    rays, and for other numbers of rays. `packed` (C, N), by the places of `keep_at`, is the light now.
+    rays, and for other numbers of rays; −1 where nothing was told. `packed` (C, N), by the places of
+    `keep_at`, is the light now.
     """
 
     def __init__(
         self, rays: int, then: U8 | None, then_at: I32 | None, keep_at: I32 | None, vertices: int
     ) -> None:
         """Light `then` (B, rays), packed; then_at, keep_at (V,) are places of vertices, or −1."""
-        self.of: F32 = np.zeros(vertices, np.float32)
+        self.of: F32 = np.full(vertices, -1, np.float32)
         kept = 0 if keep_at is None else int(keep_at.max(initial=-1)) + 1
         self.packed: U8 = np.zeros((kept, rays), np.uint8)
-        self._keep_at = keep_at
-        self._then, self._then_at = then, then_at
-        if then is not None and then.shape[1] != rays:
-            self._then = None
+        self._keep_at, self._then_at = keep_at, then_at
+        self._then = then if then is not None and then.shape[1] == rays else None
 
     def __call__(self, vertices: I64, light: F32) -> None:
         """The light (C, N) along the rays of some vertices; any thread may tell."""
         if self._then is not None and self._then_at is not None:
             correlate(vertices, light, self._then, self._then_at, self.of)
+        else:
+            self.of[vertices] = 0
         if self._keep_at is not None:
             pack_light(vertices, light, self._keep_at, self.packed)
 
@@ -65,21 +69,26 @@ def pack_light(vertices: I64, light: F32, place_of: I32, out: U8) -> None:
 
 @kernel
 def correlate(vertices: I64, light: F32, then: U8, place_of: I32, out: F32) -> None:
-    """out (V,) of vertices (C,) that have a place: ρ of light (C, N) and the squares of `then` there."""
+    """out (V,) of vertices (C,): ρ of light (C, N) and the squares of `then` (B, N) at their places."""
     many = light.shape[1]
+    zero, each = np.float32(0), np.float32(1 / many)
     for i in range(len(vertices)):
         place = place_of[vertices[i]]
+        out[vertices[i]] = zero
         if place < 0:
             continue
-        a_sum, b_sum, aa, bb, ab = 0.0, 0.0, 0.0, 0.0, 0.0
+        a_mean, b_mean = zero, zero
         for j in range(many):
-            a, b = float(then[place, j]), float(light[i, j])
-            a *= a
-            a_sum += a
-            b_sum += b
+            a = np.float32(then[place, j])
+            a_mean += a * a
+            b_mean += light[i, j]
+        a_mean, b_mean = a_mean * each, b_mean * each
+        aa, bb, ab = zero, zero, zero
+        for j in range(many):
+            a, b = np.float32(then[place, j]), light[i, j] - b_mean
+            a = a * a - a_mean
             aa += a * a
             bb += b * b
             ab += a * b
-        one, other = aa - a_sum * a_sum / many, bb - b_sum * b_sum / many
-        if one > 1e-9 * aa and other > 1e-9 * bb:
-            out[vertices[i]] = min(max((ab - a_sum * b_sum / many) / np.sqrt(one * other), 0.0), 1.0)
+        if aa > EVEN * many * a_mean * a_mean and bb > EVEN * many * b_mean * b_mean:
+            out[vertices[i]] = min(max(ab / np.sqrt(aa * bb), zero), np.float32(1))
