@@ -22,7 +22,7 @@ from studio.bench import cuts_peers
 from studio.bench.harness import Report, Timing
 from studio.bench.interreflection_edits import EDITS
 from studio.bench.interreflection_measure import Editor
-from studio.bench.interreflection_poses import poses
+from studio.bench.interreflection_poses import poses, slid
 from studio.bench.interreflection_scenes import CASES, Setting, setting
 from studio.bench.interreflection_truth import Light3, Places, Truth, TruthTracer
 from studio.headless import Headless
@@ -36,6 +36,7 @@ from studio_core.shading.cache import DiskCache
 from studio_core.shading.offline import scene_view
 
 F64 = npt.NDArray[np.float64]
+Bools = npt.NDArray[np.bool_]
 
 BACKEND = "cuts"
 METHODS = {"": "gather", "paper/": "fields"}
@@ -52,12 +53,13 @@ STILL = 4
 """Samples across and up a pixel of pictures at rest."""
 MOST = 0.98
 """Share of the places that are left where the worst are left out."""
-TIERS = ("moving", "rest")
 
 
 @dataclass(frozen=True)
 class Setup:
     """How much is measured: places a pose, paths a place in each half of the truth, edits a kind.
+
+    From the first `dragged` poses something is dragged by so many `steps`.
 
     `samples` and `converged` are Mitsuba's, a pixel, in pictures of `peer` pixels.
     """
@@ -71,6 +73,8 @@ class Setup:
     peer: tuple[int, int] = (480, 270)
     samples: tuple[int, ...] = (4, 16, 64)
     converged: int = 384
+    dragged: int = 5
+    steps: int = 3
     choices: dict[str, object] = field(default_factory=lambda: {"bounces": BOUNCES})
     cache: Path | None = None
 
@@ -85,6 +89,8 @@ QUICK = Setup(
     peer=(120, 68),
     samples=(4, 16),
     converged=32,
+    dragged=1,
+    steps=1,
 )
 
 
@@ -206,13 +212,8 @@ class Case:
         for number, scene in enumerate(poses(self.one, self.setup.poses)):
             self.say(f"pose {number}")
             editor.go(scene, True)
-            surfaces = editor.pipeline.artifact(Surfaces)
-            assert surfaces is not None
-            seen = editor.seen()
-            rows = editor.free(seen)
-            covered.append(1 - len(rows) / len(seen))
-            some = np.random.default_rng(number).choice(rows, min(self.setup.places, len(rows)), False)
-            places = Places.of(scene, surfaces, np.sort(some), editor.services)
+            places, share = self._places(scene, editor, number)
+            covered.append(share)
             made = {"moving": editor.light(places)}
             step, _ = editor.go(scene, False)
             settled.append(step.between)
@@ -220,11 +221,12 @@ class Case:
             truth = tracer(scene, self.eye, editor.pipeline, places)
             if number == 0 and self.checked:
                 self._check(scene, editor, places, truth)
-            tinted = np.array([name == self.one.tinted for name in surfaces.materials])
-            walls = tinted[surfaces.mesh.material[places.rows]]
-            for tier, light in made.items():
+            compared = [(tier, light, truth, self._walls(editor, places)) for tier, light in made.items()]
+            if number < self.setup.dragged:
+                compared += self._dragged(scene, editor, tracer, number)
+            for tier, light, true, walls in compared:
                 least = min(least, float(light.irradiance.min()))
-                for metric, value in errors_of(light, truth, walls).items():
+                for metric, value in errors_of(light, true, walls).items():
                     found.setdefault(f"{metric}_{tier}", []).append(value)
         for metric, values in found.items():
             self.add(metric, float(np.mean(values)), "1", float(np.std(values)))
@@ -233,6 +235,33 @@ class Case:
         self.add("share_covered", float(np.mean(covered)), "1")
         self.add("s_rest", float(np.median(settled)), "s", float(np.std(settled)))
         self.details["errors"] = {metric: [round(v, 5) for v in values] for metric, values in found.items()}
+
+    def _dragged(
+        self, scene: Scene, editor: Editor, tracer: TruthTracer, number: int
+    ) -> list[tuple[str, Light3, Truth, Bools]]:
+        """From rest something is dragged in small steps, each in hand: light, truth, and where walls are."""
+        made = []
+        for step, moved in enumerate(slid(self.one, scene, self.setup.steps, number)):
+            editor.go(moved, True)
+            places, _ = self._places(moved, editor, 1000 * (number + 1) + step)
+            truth = tracer(moved, self.eye, editor.pipeline, places)
+            made.append(("dragged", editor.light(places), truth, self._walls(editor, places)))
+        return made
+
+    def _places(self, scene: Scene, editor: Editor, seed: int) -> tuple[Places, float]:
+        """Places among what is seen on which nothing stands, and the share of it on which something does."""
+        surfaces, seen = editor.pipeline.artifact(Surfaces), editor.seen()
+        assert surfaces is not None
+        rows = editor.free(seen)
+        some = np.random.default_rng(seed).choice(rows, min(self.setup.places, len(rows)), False)
+        return Places.of(scene, surfaces, np.sort(some), editor.services), 1 - len(rows) / len(seen)
+
+    def _walls(self, editor: Editor, places: Places) -> Bools:
+        """(N,) which places are on what is tinted."""
+        surfaces = editor.pipeline.artifact(Surfaces)
+        assert surfaces is not None
+        tinted = np.array([name == self.one.tinted for name in surfaces.materials])
+        return np.asarray(tinted[surfaces.mesh.material[places.rows]])
 
     def _check(self, scene: Scene, editor: Editor, places: Places, truth: Truth) -> None:
         """The truth itself against Mitsuba's paths, in one pose."""

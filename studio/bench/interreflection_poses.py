@@ -23,6 +23,7 @@ FLAT = 0.03  # metres: lower things are walked on
 GAP = 1e-3  # metres between things that touch
 CONTACT = 0.35  # share of things that are pushed until they touch
 TRIES = 200
+SLIDE, TWIST = 0.02, 1.5  # metres and degrees of a step of a drag
 PARALLEL = 1e-12
 
 
@@ -30,6 +31,24 @@ def poses(setting: Setting, count: int = 20, seed: int = 7) -> list[Scene]:
     """`count` scenes that differ from the setting's in where its movable nodes stand."""
     rng = np.random.default_rng(seed)
     return [_posed(setting, rng) for _ in range(count)]
+
+
+def slid(setting: Setting, scene: Scene, count: int, seed: int) -> list[Scene]:
+    """`count` steps of a drag from a pose: a movable thing goes and turns a little further with each.
+
+    Free of what stands about, as poses are; none where there is no way to go.
+    """
+    rng = np.random.default_rng(seed)
+    for _ in range(TRIES):
+        node = setting.movable[rng.integers(len(setting.movable))]
+        angle, sign = float(rng.uniform(0, 2 * math.pi)), float(rng.choice([-1.0, 1.0]))
+        start, way = _middle(scene, node), SLIDE * np.array([math.cos(angle), math.sin(angle)])
+        made = [_turned(scene, node, start + step * way, sign * step * TWIST) for step in range(1, count + 1)]
+        around = obstacles(dataclasses.replace(setting, scene=scene), node).values()
+        hulls = [footprint(step, node) for step in made]
+        if all(inside(hull, setting) and all(apart(hull, other) for other in around) for hull in hulls):
+            return made
+    return []
 
 
 def footprint(scene: Scene, node: NodeId) -> F64:
@@ -108,14 +127,22 @@ def _posed(setting: Setting, rng: np.random.Generator) -> Scene:
 
 
 def _thrown(scene: Scene, node: NodeId, setting: Setting, rng: np.random.Generator) -> Scene:
-    """Turned by any angle about the vertical through the middle of its outline, and put anywhere."""
-    held = scene[node]
-    hull = footprint(scene, node)
-    middle = (hull.min(axis=0) + hull.max(axis=0)) / 2
+    """Turned by any angle, and put anywhere."""
     where = rng.uniform(setting.low, setting.high)
+    return _turned(scene, node, where, float(rng.uniform(-180, 180)))
+
+
+def _turned(scene: Scene, node: NodeId, where: F64, degrees: float) -> Scene:
+    """Turned about the vertical through the middle of its outline, which is put at `where` (x, z)."""
+    held, middle = scene[node], _middle(scene, node)
     away = Transform((-middle[0], 0.0, -middle[1]))
-    turn = Transform((where[0], 0.0, where[1]), axis_angle((0, 1, 0), float(rng.uniform(-180, 180))))
+    turn = Transform((where[0], 0.0, where[1]), axis_angle((0, 1, 0), degrees))
     return scene.with_nodes(dataclasses.replace(held, transform=turn @ away @ held.transform))
+
+
+def _middle(scene: Scene, node: NodeId) -> F64:
+    hull = footprint(scene, node)
+    return np.asarray((hull.min(axis=0) + hull.max(axis=0)) / 2)
 
 
 def _pushed(

@@ -141,11 +141,11 @@ def test_a_method_that_is_5_percent_too_bright_is_5_percent_wrong(program: Headl
     start, found = painted(little_room()), {}
     for wrong in (0.05, 0.1):
         report = Report("interreflection", True)
-        setup = Setup(96, 54, 2, 80, 512, 1, choices={"wrong": wrong}, cache=tmp_path)
+        setup = Setup(96, 54, 2, 80, 512, 1, dragged=1, steps=2, choices={"wrong": wrong}, cache=tmp_path)
         measure(report, program, "little", start, "too-bright", setup, peers=False)
         found[wrong] = figures(report)
     one, other = found.values()
-    for tier in ("moving", "rest"):
+    for tier in ("moving", "rest", "dragged"):
         for metric in ("indirect_rel_rmse", "indirect_rel_rmse_diffuse", "picture_rel_rmse"):
             assert other[f"{metric}_{tier}"] == pytest.approx(2 * one[f"{metric}_{tier}"], rel=0.12)
         assert 0.045 < one[f"indirect_rel_rmse_{tier}"] < 0.075
@@ -157,7 +157,7 @@ def test_a_method_that_is_5_percent_too_bright_is_5_percent_wrong(program: Headl
         assert 0 < one[f"ms_{kind}"] < one[f"ms_{kind}_whole"]
     assert 0 < one["visible"] <= one["vertices"]
     assert one["bytes_rest"] > 0
-    assert len(list(tmp_path.glob("*.npz"))) == 2, "both were compared with the same truth"
+    assert len(list(tmp_path.glob("*.npz"))) == 4, "both were compared with the same truth"
     program.close()
 
 

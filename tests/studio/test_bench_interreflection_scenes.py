@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from studio.bench.interreflection_meshes import box, bunny, shell, slab, star, teapot, vase
-from studio.bench.interreflection_poses import apart, footprint, inside, obstacles, poses, room_to_go
+from studio.bench.interreflection_poses import apart, footprint, inside, obstacles, poses, room_to_go, slid
 from studio.bench.interreflection_scenes import CASES, FURNACES, Setting, furnace, setting
 from studio.headless import Headless
 from studio_core.scene.geometry import Geometry
@@ -95,6 +95,23 @@ def test_poses_stay_inside_and_apart(name: str) -> None:
         for node in moved:
             for still in obstacles(start, node).keys() - set(start.movable):
                 assert apart(footprint(scene, node), footprint(scene, still))
+
+
+@pytest.mark.parametrize("name", ["teapot", "bleeding"])
+def test_a_drag_goes_on_by_small_steps(name: str) -> None:
+    start = made(name)
+    pose = poses(start, 1)[0]
+    steps = slid(start, pose, 3, 5)
+    assert steps == slid(start, pose, 3, 5)
+    changed = [{n for n in start.movable if step[n].transform != pose[n].transform} for step in steps]
+    assert len(steps) == 3
+    assert changed[0] == changed[1] == changed[2]
+    (node,) = changed[0]
+    centres = [footprint(scene, node).mean(axis=0) for scene in (pose, *steps)]
+    for one, other in itertools.pairwise(centres):
+        assert 0 < math.dist(one, other) < 0.1
+    for scene in steps:
+        assert inside(footprint(scene, node), start)
 
 
 def test_some_things_touch() -> None:

@@ -71,22 +71,29 @@ class Setting:
             given = (self.rows, self.variant, self.positions, *self.frames, self.row, self.eye(i))
             draw_lobes(i, i + 1, *given, offset, self.shape, sampler, self.peaked, numbers, self.directions)
 
-    def gather(self, radiance: np.ndarray, of_cosine: HitTable, of_lobes: HitTable) -> tuple[Any, Any]:
-        """Terms and irradiance, where each vertex of `radiance` (V, 3) is matte."""
+    def gather(
+        self, radiance: np.ndarray, of_cosine: HitTable, of_lobes: HitTable, along: Any = (None, None)
+    ) -> tuple[Any, Any]:
+        """Terms and irradiance, where each vertex of `radiance` (V, 3) is matte.
+
+        Arrays `along` (R, N) get the light along rays of each kind.
+        """
         terms = np.zeros((self.count, self.model.terms, 3), np.float32)
         irradiance = np.zeros((self.count, 3), np.float32)
         none, zero = np.zeros(0, np.float32), np.zeros(1, np.int64)
         brdf = (np.array([self.model.address]), np.array([self.model.terms]), zero, self.shape)
         lobes = (np.array([self.model.density]), self.peaked, np.zeros((1, self.model.terms), np.float32))
         sources = (radiance, np.full(len(radiance), -1), zero, zero, none, none)
-        for hits, pattern, world in (
-            (of_cosine, self.pattern.directions, NONE),
-            (of_lobes, NONE, self.directions),
+        untold = np.zeros((0, 0), np.float32)
+        for hits, pattern, world, told in (
+            (of_cosine, self.pattern.directions, NONE, along[0]),
+            (of_lobes, NONE, self.directions, along[1]),
         ):
             rays = (self.rows, self.rows, self.variant, hits.vertex, hits.cell, pattern, world)
             for i in range(self.count):
                 places = (self.positions, *self.frames, *self.frames, self.row, self.eye(i))
-                out = (*brdf, *lobes, *sources, terms, irradiance)
+                own = untold if told is None else told[i : i + 1]
+                out = (*brdf, *lobes, *sources, terms, irradiance, own)
                 gather_final(i, i + 1, float(self.cosine), self.lobes, *rays, *places, *out)
         return terms, irradiance
 
@@ -147,6 +154,27 @@ def test_sums_over_rays_are_weighed_by_all_densities() -> None:
         b = evaluate(setting.model, setting.shape, setting.wo[i], wi)
         np.testing.assert_allclose(irradiance[i], weight.sum(axis=0), rtol=2e-3)
         np.testing.assert_allclose(terms[i], b.T @ weight, rtol=5e-3, atol=1e-4)
+
+
+def test_light_along_every_ray_is_told() -> None:
+    setting = Setting("phong 10", 12, 16, 13)
+    rng = np.random.default_rng(4)
+    radiance = rng.random((50, 3)).astype(np.float32)
+    met = [rng.integers(0, 50, (12, count)) for count in (16, 13)]
+    met[0][0, 3], met[1][1, 2] = 0xFFFFFFFF, 0xFFFFFFFE
+    along = [np.full(one.shape, np.nan, np.float32) for one in met]
+    alone = setting.gather(radiance, *map(hits, met))
+    told = setting.gather(radiance, *map(hits, met), along)
+    for made, expected in zip(told, alone, strict=True):
+        np.testing.assert_array_equal(made, expected)
+    for one, vertex, directions in zip(
+        along, met, (setting.pattern.directions, setting.directions), strict=True
+    ):
+        own = directions[setting.variant] if directions is not setting.directions else directions
+        up = own[..., 2] if own is not directions else np.einsum("inc,ic->in", own, setting.normals)
+        there = (vertex < 50) & (up > 1e-6)
+        expected = np.where(there, radiance.sum(axis=1)[np.minimum(vertex, 49)], 0)
+        np.testing.assert_allclose(one, expected, rtol=1e-5)
 
 
 def test_matte_terms_need_no_lobes_and_peaks_do() -> None:

@@ -231,5 +231,6 @@ def multiply(vertices: I64, place: I32, share: F32, ratio: F32, sums: F32) -> No
 def _ratio(fine: F32, rough: F32) -> F32:
     """fine / rough, LEAST to MOST; 1 where the first tier found nothing."""
     made = np.ones_like(fine)
-    np.divide(fine, rough, out=made, where=rough != 0)
+    with np.errstate(over="ignore"):
+        np.divide(fine, rough, out=made, where=rough != 0)
     return np.clip(made, LEAST, MOST).astype(np.float32)

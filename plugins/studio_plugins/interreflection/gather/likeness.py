@@ -91,4 +91,4 @@ def correlate(vertices: I64, light: F32, then: U8, place_of: I32, out: F32) -> N
             bb += b * b
             ab += a * b
         if aa > EVEN * many * a_mean * a_mean and bb > EVEN * many * b_mean * b_mean:
-            out[vertices[i]] = min(max(ab / np.sqrt(aa * bb), zero), np.float32(1))
+            out[vertices[i]] = min(max(ab / (np.sqrt(aa) * np.sqrt(bb)), zero), np.float32(1))
