@@ -9,32 +9,32 @@ layer R differs from what the first tier made of the same scene, H, as q = R / H
 ρ being how alike the light along its rays is now and then (`likeness`), s how alike irradiance, min(E'/E,
 E/E'). A dimmed lamp, or a thing that is moved at the other end of the room, leaves ρ = 1 and so w = 1.
 Another lamp or another sky makes ρ small; where they bring light to what was dark, q belonged to the little
-that had been there, and s makes w smaller still.
+that had been there, and s makes w smaller still. Tiers between the first and the last are carried to in the
+same way, each with a q of its own and the first one's w: else a picture that is let go of would become worse
+before it becomes better.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from studio_core.jit import kernel
 from studio_core.scene.nodes import NodeId, Scene
 from studio_core.scene.shading_mesh import ShadingMesh
 from studio_core.scene.world_mesh import WorldMesh
 from studio_core.shading.artifacts import Shapes
 from studio_plugins.interreflection.gather.likeness import Likeness
+from studio_plugins.interreflection.gather.ratios import alike, multiply, ratio_of, share_of
 
 F32 = npt.NDArray[np.float32]
 I32 = npt.NDArray[np.int32]
 I64 = npt.NDArray[np.int64]
 U8 = npt.NDArray[np.uint8]
 Bools = npt.NDArray[np.bool_]
-
-LEAST, MOST = 0.1, 2.0
-"""Of q."""
 
 
 class Place(NamedTuple):
@@ -95,18 +95,18 @@ class Layer(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Begun:
-    """What the first tier made of a scene at receivers (C,), and the light along their rays, packed."""
+    """What tiers, by level, made of a scene at receivers (C,), and the light along their rays, packed."""
 
     scene: Scene
     place: Place
     vertices: I64
-    layer: Layer
+    layers: dict[int, Layer]
     along: tuple[U8, ...]
 
 
 @dataclass(frozen=True, eq=False)
 class Found:
-    """Ratios q of receivers; place_of (V,) is where a vertex stands among them, or −1.
+    """Ratios q of receivers, by level; place_of (V,) is where a vertex stands among them, or −1.
 
     Of each (C,) the address of its BRDF, and the first tier's irradiance, colours summed.
     """
@@ -115,8 +115,40 @@ class Found:
     place_of: I32
     models: I64
     irradiance: F32
-    ratio: Layer
+    ratios: dict[int, Layer]
     along: tuple[U8, ...]
+
+    @property
+    def arrays(self) -> list[npt.NDArray[Any]]:
+        """All that is kept."""
+        ratios = [array for ratio in self.ratios.values() for array in ratio]
+        return [self.place_of, self.models, self.irradiance, *ratios, *self.along]
+
+
+@dataclass(frozen=True, eq=False)
+class Shares:
+    """How much w of what was found goes over to vertices (C,) of a scene, at `places` there.
+
+    `own` (C,) is of irradiance, `terms` (C,) of terms.
+    """
+
+    found: Found
+    scene: Scene
+    vertices: I64
+    places: I32
+    own: F32
+    terms: F32
+
+    def over(self, layers: Sequence[Layer], level: int) -> None:
+        """Multiplies layers of a tier, in place."""
+        ratio = self.found.ratios.get(level)
+        if ratio is None:
+            return
+        for layer in layers:
+            own = (ratio.irradiance[:, None], layer.irradiance[:, None])
+            multiply(self.vertices, self.places, self.own, *own)
+            if layer.terms.shape[1] == ratio.terms.shape[1]:
+                multiply(self.vertices, self.places, self.terms, ratio.terms, layer.terms)
 
 
 class Carry:
@@ -125,16 +157,20 @@ class Carry:
     def __init__(self) -> None:
         self._begun: Begun | None = None
         self._found: Found | None = None
+        self._shares: Shares | None = None
 
     @property
     def nbytes(self) -> int:
         """Bytes of what is kept."""
-        begun, found = self._begun, self._found
+        begun, shares = self._begun, self._shares
         kept: list[npt.NDArray[Any]] = []
         if begun is not None:
-            kept += [begun.vertices, *begun.layer, *begun.along]
-        if found is not None:
-            kept += [found.place_of, found.models, found.irradiance, *found.ratio, *found.along]
+            sums = [array for layer in begun.layers.values() for array in layer]
+            kept += [begun.vertices, *sums, *begun.along]
+        if shares is not None:
+            kept += [shares.vertices, shares.places, shares.own, shares.terms, *shares.found.arrays]
+        if self._found is not None:
+            kept += self._found.arrays
         return sum({id(array): array.nbytes for array in kept}.values())
 
     def hears(self, setting: Setting, rays: tuple[int, ...], moving: bool) -> tuple[Likeness, ...]:
@@ -155,82 +191,62 @@ class Carry:
             for count, one in zip(rays, then, strict=False)
         )
 
-    def over(self, setting: Setting, layers: list[Layer], heard: tuple[Likeness, ...], moving: bool) -> None:
-        """To a first tier's layers, in place: the upright one first, then those that lean each way.
+    def first(
+        self, setting: Setting, layers: Sequence[Layer], heard: Sequence[Likeness], moving: bool
+    ) -> None:
+        """Carries over to a first tier's layers, in place: the upright one, then those that lean each way.
 
         At rest what is there without it is kept, to be compared with what is finer. `heard` is of the rays
         by the cosine and, where there are any, of those by lobes.
         """
-        vertices, found = np.flatnonzero(setting.seen), self._found
-        level = layers[0].irradiance[vertices].sum(axis=1)
+        vertices = np.flatnonzero(setting.seen)
         if not moving:
+            begun = {0: layers[0].at(vertices)}
             along = tuple(one.packed for one in heard)
-            self._begun = Begun(setting.scene, setting.place, vertices, layers[0].at(vertices), along)
-        if found is None:
-            return
-        place = found.place_of[vertices]
-        there = place >= 0
-        vertices, place, level = vertices[there], place[there], level[there]
-        alike = _alike(level, found.irradiance[place])
-        own, by_lobes = heard[0].of[vertices], heard[-1].of[vertices]
-        by_lobes = np.where(by_lobes < 0, own, by_lobes)
-        by_lobes[setting.models[vertices] != found.models[place]] = 0
-        own, by_lobes = _share(own, alike), _share(by_lobes, alike)
-        as_wide = layers[0].terms.shape[1] == found.ratio.terms.shape[1]
-        for layer in layers:
-            multiply(vertices, place, own, found.ratio.irradiance[:, None], layer.irradiance[:, None])
-            if as_wide:
-                multiply(vertices, place, by_lobes, found.ratio.terms, layer.terms)
+            self._begun = Begun(setting.scene, setting.place, vertices, begun, along)
+        self._shares = self._share(setting, layers[0].irradiance, heard)
+        if self._shares is not None:
+            self._shares.over(layers, 0)
+        if moving:
+            self._shares = None
 
-    def settle(self, setting: Setting, layer: Layer, last: bool) -> None:
-        """A finer layer of what was begun: from now on this is carried."""
-        begun = self._begun
+    def finer(self, setting: Setting, layers: Sequence[Layer], level: int, last: bool) -> None:
+        """The same for a finer tier at rest; what comes of it is what is carried from now on.
+
+        So is the last tier as it is: nothing was kept of one.
+        """
+        begun, shares = self._begun, self._shares
         if begun is None or begun.scene is not setting.scene or not begun.place.same(setting.place):
             return
         vertices = begun.vertices
-        ratio = Layer(*map(_ratio, layer.at(vertices), begun.layer))
-        for sums in ratio:
-            sums[~setting.seen[vertices]] = 1  # seen no longer: nothing finer was made
+        begun.layers[level] = layers[0].at(vertices)
+        if shares is not None and shares.scene is setting.scene and not last:
+            shares.over(layers, level)
+        finest = layers[0].at(vertices)
+        ratios = {}
+        for number, layer in begun.layers.items():
+            if number < level:
+                ratios[number] = Layer(*map(ratio_of, finest, layer))
+                for sums in ratios[number]:
+                    sums[~setting.seen[vertices]] = 1  # seen no longer: nothing finer was made
         place_of = np.full(len(setting.seen), -1, np.int32)
         place_of[vertices] = np.arange(len(vertices), dtype=np.int32)
-        level = begun.layer.irradiance.sum(axis=1)
+        irradiance = begun.layers[0].irradiance.sum(axis=1)
         models = setting.models[vertices]
-        self._found = Found(begun.place, place_of, models, level, ratio, begun.along)
+        self._found = Found(begun.place, place_of, models, irradiance, ratios, begun.along)
         if last:
-            self._begun = None
+            self._begun = self._shares = None
 
-
-def _alike(one: F32, other: F32) -> F32:
-    """The smaller of each two, neither negative, by the larger; 0 where both are 0."""
-    made, larger = np.zeros_like(one), np.maximum(one, other)
-    np.divide(np.minimum(one, other), larger, out=made, where=larger > 0)
-    return made
-
-
-def _share(likeness: F32, alike: F32) -> F32:
-    """w of ρ and s."""
-    square = np.maximum(likeness, 0) ** 2
-    made = square * alike
-    rest = alike + (1 - square) * (1 - alike)
-    np.divide(made, rest, out=made, where=rest > 0)
-    return made
-
-
-@kernel
-def multiply(vertices: I64, place: I32, share: F32, ratio: F32, sums: F32) -> None:
-    """sums (V, T, 3) of vertices (C,) times 1 + share (ratio[place] − 1), of ratio (B, T, 3)."""
-    for i in range(len(vertices)):
-        if share[i] > 0:
-            for t in range(sums.shape[1]):
-                for c in range(3):
-                    sums[vertices[i], t, c] *= np.float32(1) + share[i] * (
-                        ratio[place[i], t, c] - np.float32(1)
-                    )
-
-
-def _ratio(fine: F32, rough: F32) -> F32:
-    """fine / rough, LEAST to MOST; 1 where the first tier found nothing."""
-    made = np.ones_like(fine)
-    with np.errstate(over="ignore"):
-        np.divide(fine, rough, out=made, where=rough != 0)
-    return np.clip(made, LEAST, MOST).astype(np.float32)
+    def _share(self, setting: Setting, irradiance: F32, heard: Sequence[Likeness]) -> Shares | None:
+        """None where nothing was found."""
+        found = self._found
+        if found is None:
+            return None
+        vertices = np.flatnonzero(setting.seen & (found.place_of >= 0))
+        places = found.place_of[vertices]
+        level = alike(irradiance[vertices].sum(axis=1), found.irradiance[places])
+        own, by_lobes = heard[0].of[vertices], heard[-1].of[vertices]
+        by_lobes = np.where(by_lobes < 0, own, by_lobes)
+        by_lobes[setting.models[vertices] != found.models[places]] = 0
+        shares = share_of(own, level), share_of(by_lobes, level)
+        return Shares(found, setting.scene, vertices, places, *shares)

@@ -97,16 +97,16 @@ class FinalStage:
             mask[needed] = True
             given = (way.irradiance, met.tables[0], mask, spacing, mesh, neighbours, cosine_rays)
             way.irradiance[:] = smoothed(*given, self._workers, job)
-        if heard:
-            layers = [Layer(way.irradiance, way.terms) for way in ways]
-            self._carry.over(setting, layers, heard, frame.moving)
-        for way in ways:
-            collector.add_flat(_needed(vertices, way), way.terms, way.irradiance)
         near = 0
         if tier.follow:
             near = self._look_closer(frame, inputs, every, collector, ways, vertices, job)
-        if not hand:
-            self._carry.settle(setting, Layer(layer.irradiance, layer.terms), tier.last)
+        layers = [Layer(way.irradiance, way.terms) for way in ways]
+        if heard:
+            self._carry.first(setting, layers, heard, frame.moving)
+        elif not hand:
+            self._carry.finer(setting, layers, inputs[Chosen].level, tier.last)
+        for way in ways:
+            collector.add_flat(_needed(vertices, way), way.terms, way.irradiance)
         if layer.tilts is not None:
             gather_tilts(shapes, mesh, ways, layer.tilts)
         counts = {
@@ -127,7 +127,7 @@ class FinalStage:
         vertices: I64,
         job: Job,
     ) -> int:
-        """Adds what `near` tells; how many rays were followed on."""
+        """Adds what `near` tells, but to flat terms; how many rays were followed on."""
         surfaces, sent, follow = inputs[Surfaces], inputs[Sent], inputs[Chosen].tier.follow
         mesh, separated = surfaces.mesh, inputs[Separated]
         world = self._worlds(frame.scene, surfaces, inputs[Casters], inputs[Lighting])
@@ -145,7 +145,6 @@ class FinalStage:
             for rays, near in found:
                 own = rays._replace(vertex=near.numbered(rays))
                 collector.add(own, Sending.along_rays(near.change), needed, way, terms, irradiance)
-            collector.add_flat(needed, terms, irradiance)
             way.terms[:] += trust[:, None, None] * terms
             way.irradiance[:] = np.maximum(way.irradiance + trust[:, None] * irradiance, 0)
         return sum(len(near.row) for _, near in found) * follow
