@@ -72,7 +72,8 @@ class Pilot:
         self._seen: Bools | None = None
         self._transforms: tuple[Transform, ...] | None = None
         self._vertices: I64 = np.zeros(0, np.int64)
-        self._worth: F64 = np.zeros((0, 0))
+        self.worth: F64 = np.zeros((0, 0))
+        """(ZONES, 2^10) as `usefulness` gave it last."""
         self.zones = Zones.about(np.zeros((1, 3)))
         """Zones of the scene, by where the points are."""
         ways = direction_set(SMALLEST).directions.astype(np.float64)
@@ -98,7 +99,7 @@ class Pilot:
         elsewhere = casters.primary is not self._caster or self._strange(seen)
         known = self._transforms is not None and not elsewhere  # else it is new, or was cancelled
         if known and (moving or casters.transforms == self._transforms):
-            return self._worth
+            return self.worth
         if elsewhere:
             self._vertices = self._points(mesh, casters.primary, seen, job)
             self._caster, self._seen = casters.primary, None if seen is None else seen.copy()
@@ -114,11 +115,11 @@ class Pilot:
             cosine = points.normals @ self._ways.place[0, :, :3].T.astype(np.float32)
             worth = (bits[:, : len(self._ways)] * np.maximum(cosine, 0)) ** 2
             share = self.zones.shares(points.positions + points.origin, points.normals).astype(np.float32)
-            self._worth = np.sqrt(share @ worth / share.sum(axis=1, keepdims=True), dtype=np.float64)
+            self.worth = np.sqrt(share @ worth / share.sum(axis=1, keepdims=True), dtype=np.float64)
         else:
-            self._worth = np.ones((ZONES, len(self._ways)))
+            self.worth = np.ones((ZONES, len(self._ways)))
         self._transforms = casters.transforms
-        return self._worth
+        return self.worth
 
     def _strange(self, seen: Bools | None) -> bool:
         if seen is None or self._seen is None:
@@ -165,6 +166,12 @@ class SkyChooser:
     def nbytes(self) -> int:
         """Memory of what is kept."""
         return self._pilot.nbytes + sum(drawn.probability.nbytes for drawn in self._drawn.values())
+
+    @property
+    def worth(self) -> F64 | None:
+        """(2^10,) what directions are worth to all zones together, since `choose`; None before."""
+        known = self._pilot.worth
+        return np.sqrt((known**2).mean(axis=0)) if len(known) else None
 
     def choose(
         self,

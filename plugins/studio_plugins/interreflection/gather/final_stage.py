@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+
 import numpy as np
 import numpy.typing as npt
 
@@ -28,8 +30,11 @@ from studio_core.transport.rows import Rows
 from studio_core.transport.separable import Separated
 from studio_plugins.interreflection.gather.carrying import Carry, Layer, Setting
 from studio_plugins.interreflection.gather.collecting import NO_RAYS, Collector, Rays, Sending
+from studio_plugins.interreflection.gather.detail import noise_of, shared_noise
+from studio_plugins.interreflection.gather.following import Follower
 from studio_plugins.interreflection.gather.lobe_rays import Drawn, LobeRays
-from studio_plugins.interreflection.gather.near import Near, followed, near_rays, trusted
+from studio_plugins.interreflection.gather.near import followed, near_rays, trusted
+from studio_plugins.interreflection.gather.skylight import looking_out
 from studio_plugins.interreflection.gather.smooth import Neighbours, Spacing, smoothed
 from studio_plugins.interreflection.gather.stages import FINAL_SEED, Meetings, Sent, Tables, method_params
 from studio_plugins.interreflection.gather.tiers import Chosen
@@ -37,7 +42,6 @@ from studio_plugins.interreflection.gather.tiers import Chosen
 F32 = npt.NDArray[np.float32]
 I64 = npt.NDArray[np.int64]
 Bools = npt.NDArray[np.bool_]
-FOLLOW_SEED = 4000
 
 
 class FinalStage:
@@ -72,12 +76,13 @@ class FinalStage:
         surfaces, shapes, receivers = inputs[Surfaces], inputs[Shapes], inputs[Receivers]
         mesh, sent, tier = surfaces.mesh, inputs[Sent], inputs[Chosen].tier
         wanted, casters = receivers.seen, inputs[Casters]
-        met = self._tables(tier.final, surfaces, casters, wanted, self._meetings, job)
+        rays_of_each = tier.rays_for(int(np.count_nonzero(wanted)))
+        met = self._tables(rays_of_each, surfaces, casters, wanted, self._meetings, job)
         traced = 0 if met is self._meetings else met.rays
         self._meetings = met
         lobes = self._lobes.update(frame.scene, surfaces, casters, shapes, receivers, tier.lobes, job)
         eye = (receivers.eye - mesh.origin).astype(np.float32)
-        flat, cosine_rays = inputs[Separated].matte, sum(tier.final)
+        flat, cosine_rays = inputs[Separated].matte, sum(rays_of_each)
         collector = Collector(mesh, shapes, flat, eye, lobes, cosine_rays, self._workers, job)
         spacing = self._spacing(lambda: Spacing.of(met.tables[0], self._workers, job), met)
         neighbours = self._neighbours(mesh)
@@ -92,13 +97,24 @@ class FinalStage:
             needed = _needed(vertices, way)
             for number, rays in enumerate(every):
                 hear = heard[number] if heard and way is ways[0] else None
+                before = way.irradiance.copy()
                 collector.add(rays, sending, needed, way, way.terms, way.irradiance, hear)
+                if number == len(met.tables) - 1:
+                    parts = (before, way.irradiance - before)
             mask = np.zeros(len(wanted), np.bool_)
             mask[needed] = True
-            given = (way.irradiance, met.tables[0], mask, spacing, mesh, neighbours, cosine_rays)
-            way.irradiance[:] = smoothed(*given, self._workers, job)
+            share = functools.partial(
+                smoothed, receivers=met.tables[0], wanted=mask, spacing=spacing, mesh=mesh,
+                neighbours=neighbours, rays=cosine_rays, workers=self._workers, job=job,
+            )  # fmt: skip
+            if len(met.tables) > 1:
+                noise = noise_of(*parts, (cosine_rays - rays_of_each[-1], rays_of_each[-1]))
+                made = shared_noise(way.irradiance, noise, mask, neighbours, share, self._workers, job)
+            else:
+                made = share(way.irradiance)
+            way.irradiance[:] = made
         near = 0
-        if tier.follow:
+        if tier.paths:
             near = self._look_closer(frame, inputs, every, collector, ways, vertices, job)
         layers = [Layer(way.irradiance, way.terms) for way in ways]
         if heard:
@@ -115,7 +131,7 @@ class FinalStage:
             "rays_followed": near,
             "receivers": len(vertices),
         }
-        return self._told(inputs, layer, wanted, counts)
+        return self._told(inputs, layer, wanted, counts, cosine_rays)
 
     def _look_closer(
         self,
@@ -127,18 +143,21 @@ class FinalStage:
         vertices: I64,
         job: Job,
     ) -> int:
-        """Adds what `near` tells, but to flat terms; how many rays were followed on."""
-        surfaces, sent, follow = inputs[Surfaces], inputs[Sent], inputs[Chosen].tier.follow
-        mesh, separated = surfaces.mesh, inputs[Separated]
+        """Adds what `near` tells, but to flat terms; how many paths it took."""
+        surfaces, sent, separated = inputs[Surfaces], inputs[Sent], inputs[Separated]
+        mesh = surfaces.mesh
         world = self._worlds(frame.scene, surfaces, inputs[Casters], inputs[Lighting])
-        found: list[tuple[Rays, Near]] = []
-        given = (mesh, world, sent.sources, sent.surface, self._workers, job)
-        for number, rays in enumerate(every):
+        tables = []
+        for rays in every:
             which = rays.row_of[vertices].astype(np.int64)
-            row, ray = near_rays(rays, which[which >= 0], mesh.area, collector.row, separated.error)
-            seed = FOLLOW_SEED + 64 * number
-            found.append((rays, followed(rays, row, ray, follow, seed, *given)))
-        trust = trusted(found, len(mesh.positions))
+            tables.append(
+                (rays, *near_rays(rays, which[which >= 0], mesh.area, collector.row, separated.error))
+            )
+        world = looking_out(world, sent.worth)
+        follow = Follower(mesh, world, sent.sources, sent.surface, self._workers, job)
+        deltas, paths = followed(tables, inputs[Chosen].tier.paths, follow)
+        found = list(zip(every, deltas, strict=True))
+        trust = trusted(found, self._neighbours(mesh))
         for way in ways:
             needed = _needed(vertices, way)
             terms, irradiance = np.zeros_like(way.terms), np.zeros_like(way.irradiance)
@@ -147,9 +166,11 @@ class FinalStage:
                 collector.add(own, Sending.along_rays(near.change), needed, way, terms, irradiance)
             way.terms[:] += trust[:, None, None] * terms
             way.irradiance[:] = np.maximum(way.irradiance + trust[:, None] * irradiance, 0)
-        return sum(len(near.row) for _, near in found) * follow
+        return paths
 
-    def _told(self, inputs: Inputs, layer: LayerRadiance, wanted: Bools, counts: dict[str, int]) -> Indirect:
+    def _told(
+        self, inputs: Inputs, layer: LayerRadiance, wanted: Bools, counts: dict[str, int], rays: int
+    ) -> Indirect:
         inner, sent, tier = inputs[Meetings], inputs[Sent], inputs[Chosen].tier
         counts = {
             "rays_between_vertices": inner.rays if Meetings in inputs.rebuilt else 0,
@@ -164,7 +185,7 @@ class FinalStage:
         )
         separated = inputs[Separated]
         facts = {
-            "rays": float(sum(tier.final)),
+            "rays": float(rays),
             "lobe_rays": float(tier.lobes),
             "inner_rays": float(sum(tier.inner)),
             "functions": float(separated.count.max(initial=0)),

@@ -80,13 +80,17 @@ class ReflectingStage:
 
 @dataclass(frozen=True, eq=False)
 class Sent:
-    """What all vertices send, and how they send it; in hand without what near rays start from."""
+    """What all vertices send, and how they send it; in hand without what near rays start from.
+
+    worth (2^10,): of directions of the sky to the scene; None where there is no sky.
+    """
 
     sources: Sources
     surface: Surface
     rays: int
     nbytes: int
     tier: Tier
+    worth: npt.NDArray[np.float64] | None = None
 
 
 class SentStage:
@@ -146,7 +150,7 @@ class SentStage:
         if not inputs[Chosen].level:
             made = replace(made, before=None)
         nbytes = self._light.nbytes + made.light.matte.nbytes + made.light.functions.nbytes
-        return Sent(made, surface, counted.rays, nbytes, tier)
+        return Sent(made, surface, counted.rays, nbytes, tier, self._light.sky.worth)
 
 
 def _covered(met: Meetings, surfaces: Surfaces, neighbours: npt.NDArray[np.int32]) -> Covered:

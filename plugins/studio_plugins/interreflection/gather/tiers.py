@@ -15,9 +15,11 @@ from studio_core.shading.pipeline import Inputs
 @dataclass(frozen=True)
 class Tier:
     """Rays of a vertex, of a receiver and of its lobes; functions of a lobe as a source, with what tolerance;
-    samples of an area lamp and of the environment as sources; how often short rays are followed on (`near`).
+    samples of an area lamp and of the environment as sources.
 
-    `last`: nothing finer was asked for.
+    `most`: of `final`, tables are left out that would make more rays of all receivers together; the first
+    two never are. `paths` are how many short rays are followed on by (`near`). Both count work, so that a
+    small scene gets what a large one has no time for. `last`: nothing finer was asked for.
     """
 
     inner: tuple[int, ...]
@@ -27,7 +29,8 @@ class Tier:
     lobe_error: float
     lamp_samples: int
     environment_samples: int
-    follow: int = 0
+    most: int = 0
+    paths: int = 0
     last: bool = False
 
     def sends_as(self, other: Tier) -> bool:
@@ -38,6 +41,15 @@ class Tier:
     def _of_senders(self) -> tuple[object, ...]:
         samples = self.lamp_samples, self.environment_samples
         return self.inner, self.functions, self.lobe_error, samples
+
+    def rays_for(self, receivers: int) -> tuple[int, ...]:
+        """Of `final`, what so many receivers may have."""
+        counts = self.final[:2]
+        for more in self.final[2:]:
+            if receivers * (sum(counts) + more) > self.most:
+                break
+            counts += (more,)
+        return counts
 
 
 @dataclass(frozen=True)
@@ -50,9 +62,8 @@ class Chosen:
 
 HAND = Tier((16,), (64,), 32, 16, 0.15, 4, 64)
 REST = Tier((16, 48), (64, 192), 64, 36, 0.05, 16, 256)
-CLOSE = replace(REST, follow=1)
-CLOSER = replace(REST, follow=4)
-FINE = Tier((16, 48), (64, 192, 768), 128, 36, 0.05, 16, 1024, 8)
+CLOSE = replace(REST, final=(64, 192, 256, 512), most=5_000_000, paths=800_000)
+FINE = replace(CLOSE, lobes=128, environment_samples=1024, most=40_000_000, paths=5_000_000)
 ENOUGH_IN_HAND, ENOUGH_AT_REST = 6.0, 2.5
 """Errors of indirect light, %, that these have in most rooms (docs/interreflection.md)."""
 
@@ -61,7 +72,7 @@ def tiers(tolerance: float) -> tuple[Tier, ...]:
     """In hand, then at rest: `tolerance` is the relative error of indirect light that is aimed at, in %."""
     made = [HAND]
     if tolerance < ENOUGH_IN_HAND:
-        made += [REST, CLOSE, CLOSER]
+        made += [REST, CLOSE]
     if tolerance < ENOUGH_AT_REST:
         made.append(FINE)
     return (*made[:-1], replace(made[-1], last=True))
