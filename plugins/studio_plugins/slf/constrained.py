@@ -6,9 +6,9 @@ Per channel c and gloss level, the weighted squared difference from what is want
 
 with one amount a of shine in a given tint t for all channels. Under d ≥ 0, a ≥ 0 and d + s ≤ 1 the minimum
 over d, for a given a, is the parabola's own or at one of its bounds; which of them, changes at two values of
-a a channel. So the minimum over a lies in one of seven intervals, each with a parabola of its own: it is found
-exactly, all levels at once. (The paper rescales the unconstrained minimum; its equations 5 and 6 are those of
-the normal equations' residual, see `paper`.)
+a a channel. So the minimum over a lies in one of seven intervals, each with a parabola of its own: it is
+found exactly, all levels at once. (The paper rescales the unconstrained minimum; its equations 5 and 6 are
+those of the normal equations' residual, see `paper`.)
 """
 
 from __future__ import annotations

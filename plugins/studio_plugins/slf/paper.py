@@ -9,6 +9,7 @@ not minimise), times 1, 5 and 25 for one, two and three parameters in the mixtur
 
 from __future__ import annotations
 
+import dataclasses
 from dataclasses import dataclass
 from typing import Literal
 
@@ -118,19 +119,14 @@ def _nearest(made: F64, systems: Systems) -> F64:
 
 
 def choose(systems: Systems, solver: Solver, literal: bool = False) -> Chosen:
-    """Equation 4 over the solver's candidates: `l0` one parameter, `l2` all of them, `mixed` any by weights."""
+    """Equation 4 over a solver's candidates: `l0` one parameter, `l2` all of them, `mixed` any by weights."""
     count, levels = systems.c22.shape
     arrays = (systems.c11, systems.d1, systems.bb, systems.now, systems.c12, systems.c22, systems.d2)
     good = np.logical_and.reduce([np.isfinite(one).reshape(count, -1).all(axis=1) for one in arrays])
     lit = good & ((systems.c11 > TINY) | (systems.c22 > TINY).any(axis=1))
-    clean = Systems(
-        *(
-            np.where(lit.reshape(-1, *[1] * (one.ndim - 1)), one, 0)
-            for one in (systems.c11, systems.c12, systems.c22, systems.d1, systems.d2, systems.bb)
-        ),
-        _rescaled(np.nan_to_num(systems.now)),
-        systems.level,
-    )
+    names = ("c11", "c12", "c22", "d1", "d2", "bb")
+    kept = {name: np.where(_rows(lit, getattr(systems, name)), getattr(systems, name), 0) for name in names}
+    clean = dataclasses.replace(systems, **kept, now=_rescaled(np.nan_to_num(systems.now)))
     made = fits(clean, literal)
     d, s = made[..., 0], made[..., 1]
     c11, c12, c22 = (one.reshape(count, -1, 1) for one in (clean.c11, clean.c12, clean.c22))
@@ -154,3 +150,7 @@ def choose(systems: Systems, solver: Solver, literal: bool = False) -> Chosen:
     level = np.where(lit, level, systems.level)
     residual = np.where(lit, cost[rows, level, kind], 0.0)
     return Chosen(found, level, np.where(lit, kind, KEPT), residual, ~lit)
+
+
+def _rows(which: Bools, like: F64) -> Bools:
+    return which.reshape(-1, *[1] * (like.ndim - 1))

@@ -66,20 +66,24 @@ class Samples:
     @property
     def finite(self) -> Bools:
         """(N,) places at which all numbers are numbers."""
-        arrays = (self.wanted, self.before, self.diffuse, self.rest)
-        good = np.isfinite(self.weight) & np.isfinite(self.specular).all(axis=(0, 2))
-        return np.logical_and.reduce([good, *(np.isfinite(one).all(axis=1) for one in arrays)])
+        good: Bools = np.isfinite(self.weight) & np.isfinite(self.specular).all(axis=(0, 2))
+        for one in (self.wanted, self.before, self.diffuse, self.rest):
+            good &= np.isfinite(one).all(axis=1)
+        return good
 
     def some(self, which: npt.NDArray[Any]) -> Samples:
         """These of them."""
-        kept = (getattr(self, name)[which] for name in ("wanted", "before", "diffuse"))
-        return Samples(*kept, self.specular[:, which], self.rest[which], self.weight[which])
+        wanted, before, diffuse = self.wanted[which], self.before[which], self.diffuse[which]
+        return Samples(wanted, before, diffuse, self.specular[:, which], self.rest[which], self.weight[which])
 
     def __add__(self, other: Samples) -> Samples:
         """Both, of the same material."""
-        pairs = ((getattr(self, f.name), getattr(other, f.name)) for f in dataclasses.fields(self))
-        joined = (np.concatenate(pair, axis=-2 if pair[0].ndim > 1 else 0) for pair in pairs)
-        return Samples(*joined)
+
+        def joined(name: str, axis: int = 0) -> F64:
+            return np.concatenate([getattr(self, name), getattr(other, name)], axis=axis)
+
+        plain = {name: joined(name) for name in ("wanted", "before", "diffuse", "rest", "weight")}
+        return Samples(**plain, specular=joined("specular", 1))
 
     @property
     def importance(self) -> F64:
