@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
 from plugins.slf.strokes import painted, reflectance
@@ -36,7 +38,7 @@ def test_the_right_parameters_are_named_and_their_values_found(change, noise):
 def test_a_stroke_on_what_no_light_reaches_says_nothing():
     samples = painted(np.random.default_rng(0), NOW, CHANGES[Change.DIFFUSE])
     nothing = np.zeros_like(samples.diffuse)
-    dark = type(samples)(samples.wanted, nothing, nothing, 0 * samples.specular, nothing, samples.weight)
+    dark = dataclasses.replace(samples, before=nothing, diffuse=nothing, specular=0 * samples.specular)
     verdict = decide(dark, NOW)
     assert verdict.best.change == Change.NONE
     assert verdict.silent == Change.DIFFUSE | Change.SPECULAR | Change.GLOSS
@@ -54,9 +56,7 @@ def test_numbers_that_are_none_are_left_out():
 
 def test_where_no_highlight_is_seen_the_stroke_cannot_tell_of_it():
     samples = painted(np.random.default_rng(2), NOW, CHANGES[Change.DIFFUSE])
-    away = type(samples)(
-        samples.wanted, samples.before, samples.diffuse, 1e-3 * samples.specular, samples.rest, samples.weight
-    )
+    away = dataclasses.replace(samples, specular=1e-3 * samples.specular)
     assert decide(away, NOW).silent == Change.SPECULAR | Change.GLOSS
     assert decide(samples, NOW).silent == Change.NONE
 
