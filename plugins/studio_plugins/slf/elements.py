@@ -56,7 +56,7 @@ class Elements:
         owner = np.full(len(wanted), -1, np.int32)
         owner[some] = _owners(mesh, some, chosen)
         area = np.bincount(owner[some], mesh.area[some].astype(np.float64), len(chosen))
-        return cls(chosen, owner, area)
+        return cls(chosen, owner, area.astype(np.float64))
 
 
 def _spread(mesh: WorldMesh, some: I64, count: int) -> I64:
@@ -120,7 +120,7 @@ def thin(
 
 
 def _owners(mesh: WorldMesh, some: I64, chosen: I64) -> I32:
-    """(N,) the element of each vertex: the nearest of its object that faces alike, else the nearest at all."""
+    """(N,) the element of each vertex: the nearest of its object that faces alike, else the nearest."""
     places = mesh.positions
     near = min(NEAR, len(chosen))
     distance, found = cKDTree(places[chosen]).query(places[some], k=near)
