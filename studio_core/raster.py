@@ -236,6 +236,10 @@ class Compositor:
         layout = (maps.first, maps.size, maps.levels, maps.uv_map, _pixel_angle(hits.view))
         given = (hits.face, hits.u, hits.v, hits.distance, *faces, *looks, *layout)
         hit_coefficients(*given, out)
+        if len(table.painted):
+            corners = table.painted[faces[0][hits.face]]
+            share = np.stack([1 - hits.u - hits.v, hits.u, hits.v], axis=1)
+            out += np.einsum("nkc,nk->nc", corners, share)
         return out.reshape(-1, table.width, 3)
 
     def _added(
@@ -349,7 +353,16 @@ class Compositor:
             terms = np.ascontiguousarray(layer.of_width(table.width).terms, np.float32)
             terms = terms.reshape(count, table.width * 3)
             of_light = (terms, gain, radiance.valid)
-            given = (*of_light, mesh.material, maps.kind, table.plain, table.slope, record, sums)
+            given = (
+                *of_light,
+                mesh.material,
+                maps.kind,
+                table.plain,
+                table.slope,
+                table.painted,
+                record,
+                sums,
+            )
             self._workers.run(count, VERTICES, partial(_add_light, given), job)
         if radiance.surfaces.catches.any():
             self._backdrop.light(scene, radiance, record)

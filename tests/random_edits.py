@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from scenes import cube, floor, sky
 
-from studio_core import edits
+from studio_core import copies, edits
 from studio_core.arrays import frozen_map
 from studio_core.edits import Edit
 from studio_core.scene.geometry import Table, Texture
@@ -148,13 +148,13 @@ def _add_there(dice: Dice) -> Edit:
 
 def _duplicate(dice: Dice) -> Edit:
     known = tuple(node for node in dice.nodes() if node in dice.scene.nodes)
-    made = edits.duplicate(dice.scene, known, offset=dice.transform())
+    made = copies.duplicate(dice.scene, known, offset=dice.transform())
     names = {copy.id: f"{dice.fresh}-{i}" for i, copy in enumerate(made.nodes)}  # ids that a seed repeats
-    copies = [
+    nodes = [
         dataclasses.replace(copy, id=names[copy.id], parent=names.get(copy.parent or "", copy.parent))
         for copy in made.nodes
     ]
-    return edits.Add(tuple(copies[:CROWD]), label=made.label)
+    return edits.Add(tuple(nodes[:CROWD]), label=made.label)
 
 
 def _remove(dice: Dice) -> Edit:

@@ -73,19 +73,27 @@ def add_light(
     kind: I64,
     plain: F32,
     slope: F32,
+    painted: F32,
     record: F32,
     sums: F32,
 ) -> None:
     """Adds one light layer's terms (V, T·3) at `gain` (3,) to the vertices start … stop−1 that are valid.
 
-    record (V, RECORD) gets Σ plain · term in 0:3 and Σ slope · term in 3:6, with plain and slope (M, T·3);
-    sums (V, T·3) gets the weighted terms themselves where the material's map is its own.
+    record (V, RECORD) gets Σ (plain + painted) · term in 0:3 and Σ slope · term in 3:6, with plain and slope
+    (M, T·3), painted (V, T·3) or empty; sums (V, T·3) gets the weighted terms themselves where the material's
+    map is its own, and 0:3 of the record only what is painted.
     """
     width = terms.shape[1]
     for v in range(start, stop):
         if not valid[v]:
             continue
         m = material[v]
+        if len(painted):
+            for c in range(3):
+                base = np.float32(0)
+                for k in range(c, width, 3):
+                    base += painted[v, k] * terms[v, k]
+                record[v, c] += gain[c] * base
         if kind[m] == GENERAL:
             for k in range(width):
                 sums[v, k] += terms[v, k] * gain[k % 3]

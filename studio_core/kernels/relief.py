@@ -52,12 +52,13 @@ def add_tilts(
     plain: F32,
     slope: F32,
     typical: F32,
+    painted: F32,
     bend: F32,
 ) -> None:
     """Adds one light layer's tilts (V, 3, T·3) at `gain` (3,) to bend (V, BEND) of vertices start … stop−1.
 
     Only of those that are valid and of materials with maps, mapped (M,); terms (V, T·3), plain, slope and
-    typical (M, T·3).
+    typical (M, T·3), painted (V, T·3) or empty.
     """
     width = terms.shape[1]
     for v in range(start, stop):
@@ -65,11 +66,13 @@ def add_tilts(
         if not valid[v] or m < 0 or not mapped[m]:
             continue
         rows = typical if kind[m] == GENERAL else plain
+        coated = len(painted) > 0
         for f in range(3):
             for c in range(3):
                 base, rise = _ZERO, _ZERO
                 for k in range(c, width, 3):
-                    base += rows[m, k] * tilts[v, f, k]
+                    own = rows[m, k] + painted[v, k] if coated else rows[m, k]
+                    base += own * tilts[v, f, k]
                     rise += slope[m, k] * tilts[v, f, k]
                 bend[v, 3 * f + c] += gain[c] * base
                 if kind[m] == AFFINE:

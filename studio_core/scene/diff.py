@@ -172,6 +172,8 @@ def _node_diff(old: Node, new: Node) -> Aspect:
             aspect |= Aspect.TRANSFORM | _light(new, Aspect.TRANSFORM)
         elif name == "parent":
             aspect |= Aspect.STRUCTURE | Aspect.TRANSFORM | _light(new, Aspect.TRANSFORM)
+        elif name == "paint":
+            aspect |= Aspect.MATERIAL | Aspect.STROKES
         elif isinstance(new, MeshObject):
             aspect |= Aspect.GEOMETRY if name == "geometry" else Aspect.MATERIAL | Aspect.STRUCTURE
         elif isinstance(new, Light):

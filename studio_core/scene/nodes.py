@@ -17,6 +17,7 @@ from studio_core.colour import kelvin
 from studio_core.errors import EditError
 from studio_core.params import Colour, Value, param
 from studio_core.scene.geometry import Geometry, Image, Table, Texture
+from studio_core.scene.paint import Paint
 from studio_core.scene.transform import IDENTITY, Transform, axis_angle, multiply
 
 NodeId = str
@@ -76,10 +77,14 @@ class Group(Node):
 
 @dataclass(frozen=True, kw_only=True)
 class MeshObject(Node):
-    """A mesh with one material a slot; nodes with the same `geometry` are instances."""
+    """A mesh with one material a slot; nodes with the same `geometry` are instances.
+
+    `paint` is what strokes changed of its materials on this object alone.
+    """
 
     geometry: Geometry
     materials: tuple[MaterialId, ...]
+    paint: Paint | None = None
 
 
 @dataclass(frozen=True, kw_only=True)

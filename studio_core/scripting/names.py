@@ -12,8 +12,9 @@ import numpy.typing as npt
 
 from studio_core import edits, errors
 from studio_core.contract import ImportedModel, Registry, Services
+from studio_core.copies import duplicate
 from studio_core.document import Document
-from studio_core.edits import Add, Assign, Compound, Edit, Move, Remove, SetFields, SetMaterial, duplicate
+from studio_core.edits import Add, Assign, Compound, Edit, Move, Remove, SetFields, SetMaterial
 from studio_core.errors import EditError, InputError
 from studio_core.params import check, param_infos
 from studio_core.rooms import new_room

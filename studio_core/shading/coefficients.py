@@ -9,7 +9,7 @@ found out by asking the model along the range of the picture's values. A term th
 from __future__ import annotations
 
 import dataclasses
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -23,6 +23,7 @@ from studio_core.scene.geometry import Image
 from studio_core.scene.nodes import Material, Scene
 from studio_core.shading.artifacts import Surfaces
 from studio_core.shading.materials import Resolved, coefficients, linear_rgb, resolve
+from studio_core.shading.painting import PaintTable
 from studio_core.shading.pyramids import LEVELS, Pyramid, joined, lay_out, pyramid
 from studio_core.shading.reliefs import Reliefs, ReliefTable
 
@@ -57,7 +58,8 @@ class Maps:
 class Coefficients:
     """Coefficients (M, T·3) are plain + slope · texel, or rows of a map; `typical` are their means.
 
-    T is the most terms that one of the materials has. `reliefs` are their normal maps, None without any.
+    T is the most terms that one of the materials has. painted (V, T·3) is what strokes add at the vertices of
+    the meshes, (0, 0) without any. `reliefs` are their normal maps, None without any.
     """
 
     plain: F32
@@ -65,6 +67,7 @@ class Coefficients:
     typical: F32
     maps: Maps
     reliefs: Reliefs | None = None
+    painted: F32 = field(default_factory=lambda: np.zeros((0, 0), np.float32))
 
     @property
     def width(self) -> int:
@@ -95,10 +98,11 @@ class CoefficientTable:
         self._pictures: dict[tuple[str, bool], Pyramid] = {}
         self._made: tuple[tuple[_Look, ...], Coefficients] | None = None
         self._reliefs = ReliefTable()
+        self._paint = PaintTable(registry)
         self._stored: dict[int, tuple[tuple[Pyramid, ...], F32, list[int]]] = {}
 
     def __call__(self, scene: Scene, surfaces: Surfaces) -> Coefficients:
-        """The table for `surfaces.materials`; the same object while none of them changes."""
+        """The table for `surfaces.materials`; the same object while neither they nor paint changes."""
         looks: dict[str, _Look] = {}
         pictures: dict[tuple[str, bool], Pyramid] = {}
         for name in surfaces.materials:
@@ -112,6 +116,10 @@ class CoefficientTable:
         made = tuple(looks.values())
         if self._made is None or self._made[0] != made:
             self._made = made, self._assemble(made)
+        table = self._made[1]
+        painted = self._paint(scene, surfaces.materials, surfaces.mesh, table.width)
+        if painted is not table.painted:
+            self._made = made, dataclasses.replace(table, painted=painted)
         return self._made[1]
 
     def _look(self, material: Material, pictures: dict[tuple[str, bool], Pyramid]) -> _Look:

@@ -54,7 +54,7 @@ class Embosser:
             return None
         count, width = len(radiance.valid), table.width
         bend = np.zeros((count, BEND), np.float32)
-        looks = (table.maps.kind, reliefs.levels > 0, table.plain, table.slope, table.typical)
+        looks = (table.maps.kind, reliefs.levels > 0, table.plain, table.slope, table.typical, table.painted)
         for gain, layer in lit(scene, radiance):
             sized = layer.of_width(width)
             if sized.tilts is None:

@@ -151,7 +151,10 @@ class ErrorMeter:
         points, own = chosen_points(mesh, some), shapes.of_points(some)
         truth = self._brute(points, points, own, lighting, casters, frame, job)
         lights = _lights(frame)
-        looks = table.typical[mesh.material[some]].reshape(-1, table.width, 3)
+        looks = table.typical[mesh.material[some]]
+        if len(table.painted):
+            looks = looks + table.painted[some]
+        looks = looks.reshape(-1, table.width, 3)
         shown = (radiance.combined(lights)[some] * looks).sum(axis=1)
         truth = {node: truth[node] for node in radiance.layers}
         every = np.ones(len(some), np.bool_)

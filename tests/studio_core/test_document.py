@@ -25,7 +25,7 @@ from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, 
 from random_edits import random_edit
 from scenes import fingerprint, little_scene
 
-from studio_core import edits
+from studio_core import copies, edits
 from studio_core.document import Document, Gesture, Step
 from studio_core.errors import EditError
 from studio_core.project.codec import scene_digest
@@ -461,7 +461,7 @@ def test_a_shared_mesh_costs_once() -> None:
     document = Document(little_scene())
     document.apply(move(0.0))
     bare = document.history_bytes()
-    document.apply(edits.duplicate(document.scene, ("cube",)))
+    document.apply(copies.duplicate(document.scene, ("cube",)))
     assert document.history_bytes() - bare < 2000
 
 

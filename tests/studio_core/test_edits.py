@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from random_edits import MAKERS, Dice, random_edit
 from scenes import cube, fingerprint, floor, little_scene, sky
 
-from studio_core import edits
+from studio_core import copies, edits
 from studio_core.arrays import frozen_map
 from studio_core.errors import EditError
 from studio_core.scene.geometry import Geometry, Texture
@@ -330,7 +330,7 @@ def test_absurd_scales_are_refused_in_a_sentence(above: float, scale: float) -> 
 
 
 def test_duplicates_share_meshes_and_hang_together() -> None:
-    add = edits.duplicate(SCENE, ("outer", "chair"), offset=Transform((1.0, 0.0, 0.0)))
+    add = copies.duplicate(SCENE, ("outer", "chair"), offset=Transform((1.0, 0.0, 0.0)))
     made = add(SCENE)
     new = [made[n] for n in made.nodes if n not in SCENE.nodes]
     assert [type(n).__name__ for n in new] == ["Group", "Group", "MeshObject", "PointLamp"]
@@ -347,14 +347,14 @@ def test_duplicates_share_meshes_and_hang_together() -> None:
 
 def test_copies_are_numbered_from_the_first_free_name() -> None:
     scene = Scene().with_nodes(Camera(id="a", name="Front"), Camera(id="b", name="Front 2"))
-    assert edits.duplicate(scene, ("a",)).nodes[0].name == "Front 3"
-    assert edits.duplicate(scene, ("b",)).nodes[0].name == "Front 3"
+    assert copies.duplicate(scene, ("a",)).nodes[0].name == "Front 3"
+    assert copies.duplicate(scene, ("b",)).nodes[0].name == "Front 3"
 
 
 def test_copies_can_have_materials_of_their_own() -> None:
-    plain = edits.duplicate(SCENE, ("outer",))
+    plain = copies.duplicate(SCENE, ("outer",))
     assert plain.materials == ()
-    own = edits.duplicate(SCENE, ("outer", "lamp"), own_materials=True)
+    own = copies.duplicate(SCENE, ("outer", "lamp"), own_materials=True)
     made = own(SCENE)
     (chair,) = [n for n in own.nodes if isinstance(n, MeshObject)]
     (paint,) = own.materials
@@ -371,15 +371,15 @@ def test_copies_of_several_have_several_names() -> None:
     two = SCENE.with_nodes(
         Group(id="a", name="Chair"), Group(id="b", name="Chair"), Group(id="c", name="Chair 2")
     )
-    names = [node.name for node in edits.duplicate(two, ("a", "b", "c")).nodes]
+    names = [node.name for node in copies.duplicate(two, ("a", "b", "c")).nodes]
     assert names == ["Chair 3", "Chair 4", "Chair 5"]
 
 
 def test_a_material_is_made_its_own_only_where_others_use_it() -> None:
     other = MeshObject(id="other", name="Other", geometry=cube(), materials=("paint",))
     both = edits.Add((other,))(SCENE)
-    made = edits.with_own_materials(both, ("outer",))(both)
+    made = copies.with_own_materials(both, ("outer",))(both)
     (mine,) = made["chair"].materials  # type: ignore[attr-defined]
     assert mine != "paint"
     assert made["other"] is both["other"]
-    assert edits.with_own_materials(made, ("outer",))(made) is made, "nobody else uses it any more"
+    assert copies.with_own_materials(made, ("outer",))(made) is made, "nobody else uses it any more"

@@ -9,8 +9,9 @@ from typing import Any
 import pytest
 from scenes import cube, fingerprint
 
+from studio_core.copies import duplicate
 from studio_core.document import Document
-from studio_core.edits import Assign, Edit, Move, SetFields, SetGeometry, duplicate
+from studio_core.edits import Assign, Edit, Move, SetFields, SetGeometry
 from studio_core.errors import EditError, ProjectError
 from studio_core.project import codec
 from studio_core.project.canonical import loads

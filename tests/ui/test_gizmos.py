@@ -11,7 +11,8 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from ui_support import room
 
-from studio_core.edits import Add, Move, duplicate
+from studio_core.copies import duplicate
+from studio_core.edits import Add, Move
 from studio_core.scene.bounds import exact_bounds
 from studio_core.scene.nodes import PointLamp, Scene
 from studio_core.scene.room import Room

@@ -187,24 +187,28 @@ def test_what_is_not_hit_shows_what_lies_beside():
     assert _shade(CONSTANT, face=-1, beside=beside).tolist() == [1, 2, 3]
 
 
-@given(st.integers(0, 3))
-def test_light_is_added_term_by_term_where_it_was_computed(seed):
+@given(st.integers(0, 3), st.booleans())
+def test_light_is_added_term_by_term_where_it_was_computed(seed, coated):
     rng = np.random.default_rng(seed)
     terms, gain = rng.random((2, 7, 9)).astype(np.float32), rng.random((2, 3)).astype(np.float32)
     valid, material = rng.random(7) < 0.7, rng.integers(0, 3, 7).astype(np.int32)
     kind = np.array([CONSTANT, AFFINE, GENERAL])
     plain, slope = rng.random((2, 3, 9)).astype(np.float32)
+    painted = (rng.random((7, 9)) - 0.5).astype(np.float32) if coated else np.zeros((0, 0), np.float32)
     record, sums = np.zeros((7, RECORD), np.float32), np.zeros((7, 9), np.float32)
     for layer in range(2):
         for start, stop in ((0, 4), (4, 7)):
-            add_light(
-                start, stop, terms[layer], gain[layer], valid, material, kind, plain, slope, record, sums
-            )
+            light = (terms[layer], gain[layer], valid, material)
+            add_light(start, stop, *light, kind, plain, slope, painted, record, sums)
     weighted = (terms.reshape(2, 7, 3, 3) * gain[:, None, None]).sum(axis=0) * valid[:, None, None]
     for v, m in enumerate(material):
         expected = (np.stack([plain[m], slope[m]]).reshape(2, 3, 3) * weighted[v]).sum(axis=1)
         expected[1] *= kind[m] == AFFINE
-        np.testing.assert_allclose(record[v, :6].reshape(2, 3), expected * (kind[m] != GENERAL), rtol=1e-5)
+        expected *= kind[m] != GENERAL
+        if coated:
+            expected[0] += (painted[v].reshape(3, 3) * weighted[v]).sum(axis=0)
+        made = record[v, :6].reshape(2, 3)
+        np.testing.assert_allclose(made, expected, rtol=1e-5, atol=1e-6)
         np.testing.assert_allclose(sums[v], weighted[v].ravel() * (kind[m] == GENERAL), rtol=1e-5)
 
 

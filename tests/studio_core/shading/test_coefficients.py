@@ -24,7 +24,8 @@ GREY = Image(RNG.random((4, 4, 1)).astype(np.float32))
 
 def table_of(host, *materials, keeper=None):
     scene = Scene().with_materials(*materials)
-    surfaces = SimpleNamespace(materials=tuple(m.id for m in materials))
+    unpainted = SimpleNamespace(objects=())
+    surfaces = SimpleNamespace(materials=tuple(m.id for m in materials), mesh=unpainted)
     return (keeper or CoefficientTable(host))(scene, surfaces)
 
 

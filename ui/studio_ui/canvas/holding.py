@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable
 
-from studio_core.edits import duplicate
+from studio_core.copies import duplicate
 from studio_core.scene.nodes import NodeId
 from studio_core.session import Session
 from studio_ui.canvas.drags import CopyDrag, Drag, Hold

@@ -8,7 +8,8 @@ from typing import Literal
 
 import numpy as np
 
-from studio_core.edits import Compound, Edit, Move, duplicate, with_own_materials
+from studio_core.copies import duplicate, with_own_materials
+from studio_core.edits import Compound, Edit, Move
 from studio_core.scene.arranging import PLACELESS, Placed, Side, aligned, distributed, roots, shifted
 from studio_core.scene.bounds import exact_bounds
 from studio_core.scene.nodes import MeshObject, NodeId, Scene

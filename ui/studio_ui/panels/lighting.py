@@ -10,7 +10,8 @@ from PySide6.QtCore import QTimer
 from PySide6.QtGui import QPaintEvent
 from PySide6.QtWidgets import QMenu, QPushButton, QToolButton
 
-from studio_core.edits import Add, Compound, Remove, SetFields, duplicate
+from studio_core.copies import duplicate
+from studio_core.edits import Add, Compound, Remove, SetFields
 from studio_core.scene.diff import Changes
 from studio_core.scene.nodes import Environment, Light, NodeId, Scene, new_id
 from studio_ui.context import Context
