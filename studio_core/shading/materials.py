@@ -42,7 +42,7 @@ class Resolved:
         """The values where the pictures of `shaping`, in their order, have these texels."""
         made = {**self.values}
         for name, texel in zip(self.shaping, texels, strict=True):
-            made[name] = _number(made[name]) * texel
+            made[name] = scalar(made[name]) * texel
         return made
 
     def typical(self, mean: Callable[[Image], float] | None = None) -> Mapping[str, Value]:
@@ -87,7 +87,7 @@ def resolve(material: Material, registry: Registry) -> Resolved:
     turning = getattr(brdf, "turning", "")
     if turning and textures:
         texture = next(iter(textures.values()))
-        values[turning] = math.remainder(_number(values[turning]) + texture.rotation, 360.0)
+        values[turning] = math.remainder(scalar(values[turning]) + texture.rotation, 360.0)
     if not getattr(brdf, "tables", ()):
         return Resolved(brdf, values, textures, problem, (), shaping)
     try:
@@ -125,7 +125,8 @@ def mean_texel(image: Image) -> float:
     return float(first_channel(image).mean(dtype=np.float64))
 
 
-def _number(value: Value) -> float:
+def scalar(value: Value) -> float:
+    """Of a value that must be one; PluginError else."""
     if isinstance(value, tuple | str):
         raise PluginError("only numbers of a shape may have pictures")
     return float(value)
@@ -256,6 +257,7 @@ __all__ = [
     "mean_texel",
     "resolve",
     "same_shapes",
+    "scalar",
     "shape_textures",
     "shapes",
 ]

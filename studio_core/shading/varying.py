@@ -6,7 +6,7 @@ of the surface that belongs to the vertex (mip levels, as sharp as the mesh is f
 1/255, or of a half, a quarter, … of that while no more than 255 of them lead from its darkest to its
 brightest texel. So a value is wrong by less than 1/255 of the picture's range, and texels of eight bits from
 black to white are not rounded at all. Several pictures of a material share at most MOST rows, with longer
-steps where need be.
+steps where need be. Numbers that strokes changed on an object (`scene.paint`) vary in the same way.
 """
 
 from __future__ import annotations
@@ -21,13 +21,15 @@ import numpy as np
 import numpy.typing as npt
 
 from studio_core.contract import Registry
+from studio_core.params import Value, param_infos
 from studio_core.scene.geometry import Image, Texture
 from studio_core.scene.nodes import MaterialId, Scene
 from studio_core.scene.shading_mesh import NO_BACK
 from studio_core.scene.world_mesh import WorldMesh
 from studio_core.shading.artifacts import Shapes
-from studio_core.shading.materials import Resolved, finite_shape, first_channel, resolve, shapes
+from studio_core.shading.materials import Resolved, finite_shape, first_channel, resolve, scalar, shapes
 from studio_core.shading.normal_maps import mean_slope
+from studio_core.shading.painting import Changes, Coat, Coats, painted, shape_changes
 
 F32 = npt.NDArray[np.float32]
 I32 = npt.NDArray[np.int32]
@@ -115,10 +117,36 @@ def picture_areas(mesh: WorldMesh) -> F32:
 
 @dataclass(frozen=True, eq=False)
 class Steps:
-    """texels (R, K) that points have, and of each point (P,) which of them."""
+    """texels (R, K) that points have, and of each point (P,) which of them.
+
+    First are those of the pictures of a material's shape, then what strokes changed of its parameters
+    `painted`.
+    """
 
     texels: npt.NDArray[np.float64]
     which: I64
+    painted: tuple[str, ...] = ()
+
+    def values(self, resolved: Resolved, row: int) -> Mapping[str, Value]:
+        """A material's values with one of the rows."""
+        count = len(resolved.shaping)
+        made = dict(resolved.scaled(self.texels[row, :count].tolist()))
+        infos = param_infos(resolved.brdf.Params)
+        for name, change in zip(self.painted, self.texels[row, count:].tolist(), strict=True):
+            made[name] = float(painted(scalar(made[name]), change, infos[name]))
+        return made
+
+
+@dataclass(frozen=True, eq=False)
+class _Coated:
+    """What strokes changed of a material's shape at its vertices: by parameter (P, K), and of which coats."""
+
+    names: tuple[str, ...]
+    changes: F32
+    coats: tuple[Coat, ...]
+
+
+UNPAINTED = _Coated((), np.zeros((0, 0), np.float32), ())
 
 
 class ShapeTable:
@@ -130,11 +158,14 @@ class ShapeTable:
         self._slopes: dict[str, float] = {}
         self._uvs: F32 | None = None
         self._areas: F32 = np.zeros(0, np.float32)
-        self._kept: dict[MaterialId, tuple[Mapping[str, Texture], I64, Steps]] = {}
+        self._coats = Coats()
+        self._kept: dict[MaterialId, tuple[Mapping[str, Texture], I64, tuple[Coat, ...], Steps]] = {}
 
     def __call__(self, scene: Scene, materials: Sequence[MaterialId], mesh: WorldMesh) -> Shapes:
         """For the vertices of a mesh whose `material` counts in `materials`."""
         base, varying = self._begun(scene, materials)
+        coated = self._coated(scene, materials, mesh)
+        varying |= {m: resolve(scene.material(materials[m]), self._registry) for m in coated}
         if not varying:
             self._uvs, self._kept = None, {}
             return base
@@ -144,10 +175,12 @@ class ShapeTable:
         kept = {}
         for number, resolved in varying.items():
             name, own = materials[number], np.flatnonzero(mesh.material == number)
-            textures, before, steps = self._kept.get(name, ({}, own, None))
-            if steps is None or textures != resolved.shaping or not np.array_equal(before, own):
-                steps = self._steps(resolved, mesh.uvs[own], self._areas[own])
-            kept[name] = (resolved.shaping, own, steps)
+            coat = coated.get(number, UNPAINTED)
+            textures, before, coats, steps = self._kept.get(name, ({}, own, (), None))
+            same = textures == resolved.shaping and coats == coat.coats and np.array_equal(before, own)
+            if steps is None or not same:
+                steps = self._steps(resolved, mesh.uvs[own], self._areas[own], coat)
+            kept[name] = (resolved.shaping, own, coat.coats, steps)
             found.append((number, resolved, own, steps))
         self._kept = kept
         return _extended(base, mesh.material, found)
@@ -159,7 +192,7 @@ class ShapeTable:
         for number, resolved in varying.items():
             own = np.flatnonzero(material == number)
             nothing = np.zeros(len(own), np.float32)
-            found.append((number, resolved, own, self._steps(resolved, uvs[own], nothing)))
+            found.append((number, resolved, own, self._steps(resolved, uvs[own], nothing, UNPAINTED)))
         return _extended(base, material, found) if found else base
 
     def _begun(self, scene: Scene, materials: Sequence[MaterialId]) -> tuple[Shapes, dict[int, Resolved]]:
@@ -182,14 +215,42 @@ class ShapeTable:
         base = shapes(scene, materials, self._registry, lambda image: self._pictures[image.key].mean, steep)
         return base, found
 
-    def _steps(self, resolved: Resolved, uvs: F32, area: F32) -> Steps:
-        """What the pictures of a material come to at some points."""
+    def _coated(self, scene: Scene, materials: Sequence[MaterialId], mesh: WorldMesh) -> dict[int, _Coated]:
+        """Materials, by number, of which strokes changed the shape somewhere."""
+        parts: dict[int, list[tuple[Coat, I64, Changes]]] = {}
+        for index, coat in self._coats(scene, mesh).items():
+            start, number = mesh.vertex_offsets[index], mesh.material[mesh.vertices_of(index)]
+            for m in np.unique(number[number >= 0]).tolist():
+                some = np.flatnonzero(number == m)
+                resolved = resolve(scene.material(materials[m]), self._registry)
+                changes = shape_changes(resolved, coat.changes(some))
+                if changes:
+                    parts.setdefault(m, []).append((coat, some + start, changes))
+        made = {}
+        for m, coats in parts.items():
+            own = np.flatnonzero(mesh.material == m)
+            names = tuple(dict.fromkeys(name for _, _, changes in coats for name in changes))
+            changed = np.zeros((len(own), len(names)), np.float32)
+            for _, vertices, changes in coats:
+                rows = np.searchsorted(own, vertices)
+                for column, name in enumerate(names):
+                    if name in changes:
+                        changed[rows, column] = changes[name]
+            made[m] = _Coated(names, changed, tuple(coat for coat, _, _ in coats))
+        return made
+
+    def _steps(self, resolved: Resolved, uvs: F32, area: F32, coat: _Coated) -> Steps:
+        """What the pictures of a material, and strokes, come to at some points."""
         values, ranges = [], []
         for texture in resolved.shaping.values():
             grey = self._pictures[texture.image.key]
             values.append(grey.at(texture.placed(uvs), area * np.float32(texture.area)))
             ranges.append(grey.range)
-        return stepped(np.stack(values, axis=1), ranges)
+        for column in coat.changes.T if coat.names else ():
+            values.append(column)
+            ranges.append((float(column.min()), float(column.max())))
+        made = stepped(np.stack(values, axis=1), ranges)
+        return dataclasses.replace(made, painted=coat.names)
 
 
 def stepped(values: F32, ranges: Sequence[tuple[float, float]]) -> Steps:
@@ -217,9 +278,9 @@ def _extended(base: Shapes, material: I32, found: Sequence[tuple[int, Resolved, 
     length = len(base.data) - 1
     for number, resolved, own, steps in found:
         row[own] = len(offset) + steps.which
-        for texels in steps.texels:
+        for step in range(len(steps.texels)):
             offset.append(length)
-            data.append(finite_shape(resolved.brdf, resolved.scaled(texels.tolist())))
+            data.append(finite_shape(resolved.brdf, steps.values(resolved, step)))
             length += len(data[-1])
         owner.append(np.full(len(steps.texels), number))
     of = np.concatenate(owner).astype(np.int64)
