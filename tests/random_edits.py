@@ -28,6 +28,7 @@ from studio_core.scene.nodes import (
     Scene,
     SpotLamp,
 )
+from studio_core.scene.paint import Paint
 from studio_core.scene.room import SLOTS, Room
 from studio_core.scene.room_shape import Opening
 from studio_core.scene.transform import Transform, axis_angle
@@ -187,6 +188,14 @@ def _assign(dice: Dice) -> Edit:
     return edits.Assign(dice.node(), dice.material(), dice.rng.choice((None, 0, 3)))
 
 
+def _set_paint(dice: Dice) -> Edit:
+    count = dice.rng.randint(1, 5)
+    rng = np.random.default_rng(dice.rng.randint(0, 99))
+    changes = {"base_color": rng.normal(size=(count, 3)), "roughness": rng.normal(size=count)}
+    paint = Paint.of(rng.normal(size=(count, 3)), rng.normal(size=(count, 3)), np.zeros(count), changes)
+    return edits.SetPaint(dice.node(), paint if dice.rng.random() < 0.8 else None)
+
+
 def _add_material(dice: Dice) -> Edit:
     return edits.AddMaterial(dice.new_material())
 
@@ -239,6 +248,7 @@ MAKERS: list[Callable[[Dice], Edit]] = [
     _order,
     _set_geometry,
     _assign,
+    _set_paint,
     _add_material,
     *[_remove_material] * 2,
     _set_material,

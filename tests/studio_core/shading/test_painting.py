@@ -56,7 +56,7 @@ def everywhere(changes, rng=None):
     sides = np.concatenate([np.eye(3), -np.eye(3)])
     normals = np.repeat(sides, 20, axis=0)
     places = rng.uniform(-0.5, 0.5, normals.shape)
-    places = np.where(normals != 0, 0.5 * normals, places) + [0, 0.5, 0]
+    places = np.where(normals != 0, 0.5 * normals, places) + np.array([0, 0.5, 0])
     wide = {name: np.broadcast_to(v, (len(places), *np.shape(v))) for name, v in changes.items()}
     return Paint.of(places, normals, np.zeros(len(places)), wide)
 
