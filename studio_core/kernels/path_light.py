@@ -100,6 +100,9 @@ def light_paths(
                     texel(looks.tables, looks.first[m], looks.size[m, 0], looks.size[m, 1], tu, tv, rows)
                     for k in range(3 * width):
                         colour[k] = rows[k]
+            if len(looks.painted):
+                for k in range(3 * width):
+                    colour[k] += looks.painted[paths.vertex[n], k]
             surface_frame(paths.normal[n], paths.tangent[n], axes)
             x, y, z = _local(axes, -paths.direction[n, 0], -paths.direction[n, 1], -paths.direction[n, 2])
             if z < LOWEST_VIEW:

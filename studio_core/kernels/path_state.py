@@ -97,7 +97,10 @@ class Mesh(NamedTuple):
 
 
 class Looks(NamedTuple):
-    """Coefficients of M materials, see `shading.coefficients`; first (M,), size (M, 2): finest level."""
+    """Coefficients of M materials, see `shading.coefficients`; first (M,), size (M, 2): finest level.
+
+    painted (V, T·3), or empty: what strokes add at vertices.
+    """
 
     kind: I64
     plain: F32
@@ -107,6 +110,7 @@ class Looks(NamedTuple):
     first: I64
     size: I64
     uv_map: F32
+    painted: F32
 
 
 class Models(NamedTuple):

@@ -237,7 +237,7 @@ class _Batch:
                 break
             shapes = world.shapes
             if shapes.row is not None:
-                shapes = world.shapes_at(paths.material[active], paths.uv[active])
+                shapes = world.shapes_at(paths.material[active], paths.uv[active], paths.vertex[active])
                 assert shapes.row is not None
                 paths.row[active] = shapes.row
 

@@ -59,15 +59,17 @@ class PathWorld:
     shapes: Shapes
     lights: Lights
     table: ShapeTable = field(repr=False)
+    vertices: WorldMesh = field(repr=False)
 
     @property
     def dark(self) -> bool:
         """Whether nothing shines."""
         return not len(self.lights.kind) and not self.lights.k
 
-    def shapes_at(self, material: I32, uvs: F32) -> Shapes:
-        """Where pictures change the shape of a material (`shapes.row` is not None): for points of our own."""
-        return self.table.at(self.scene, self.materials, material, uvs)
+    def shapes_at(self, material: I32, uvs: F32, vertex: I32) -> Shapes:
+        """Where pictures or paint change shapes (`shapes.row` is not None): for points near vertices (P,)."""
+        near = vertex.astype(np.int64)
+        return self.table.at(self.scene, self.materials, material, uvs, self.vertices, near)
 
 
 class PathWorlds:
@@ -84,7 +86,7 @@ class PathWorlds:
         surfaces = surfaces.unrefined
         mesh, caster = surfaces.mesh, casters.primary
         nothing = np.zeros(0, np.int32), np.zeros((0, 2), np.float32)
-        shapes = self._table.at(scene, surfaces.materials, *nothing)
+        shapes = self._table.at(scene, surfaces.materials, *nothing, mesh)
         table = self._coefficients(scene, surfaces)
         handles = caster.handles()
         tracer = Tracer(
@@ -107,6 +109,7 @@ class PathWorlds:
             shapes,
             self._lights(scene, lighting, caster.centre),
             self._table,
+            mesh,
         )
 
     def _models(self, scene: Scene, materials: Sequence[MaterialId], shapes: Shapes, width: int) -> Models:
@@ -232,7 +235,8 @@ def _mesh(mesh: WorldMesh, centre: F64) -> Mesh:
 def _looks(table: Coefficients) -> Looks:
     maps = table.maps
     first, size = maps.first[:, 0].copy(), maps.size[:, 0].copy()
-    return Looks(maps.kind, table.plain, table.slope, maps.texels, maps.tables, first, size, maps.uv_map)
+    layout = (first, size, maps.uv_map, table.painted)
+    return Looks(maps.kind, table.plain, table.slope, maps.texels, maps.tables, *layout)
 
 
 __all__ = ["PathWorld", "PathWorlds", "shown_gains"]

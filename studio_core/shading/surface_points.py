@@ -54,6 +54,13 @@ def surface_uvs(surfaces: Surfaces, hits: Hits, eye: F64) -> F32:
     return at.astype(np.float32)
 
 
+def nearest_vertices(surfaces: Surfaces, hits: Hits, eye: F64) -> npt.NDArray[np.int64]:
+    """(P,) the corner that each hit is nearest to, of the side that is seen."""
+    corners, weights, _ = _corners(surfaces, hits, eye)
+    nearest = np.take_along_axis(corners, np.argmax(weights, axis=1)[:, None], axis=1)
+    return nearest[:, 0].astype(np.int64)
+
+
 def _corners(surfaces: Surfaces, hits: Hits, eye: F64) -> tuple[npt.NDArray[np.integer[Any]], F64, F64]:
     """Vertices (P, 3) of the side that is seen, their weights (P, 3), and normals (P, 3) of the faces."""
     mesh = surfaces.mesh

@@ -139,14 +139,20 @@ class Steps:
 
 @dataclass(frozen=True, eq=False)
 class _Coated:
-    """What strokes changed of a material's shape at its vertices: by parameter (P, K), and of which coats."""
+    """What strokes changed of a material's shape at its vertices `own` (P,): by parameter (P, K)."""
 
     names: tuple[str, ...]
     changes: F32
     coats: tuple[Coat, ...]
+    own: I64
+
+    def at(self, vertices: I64) -> _Coated:
+        """At some of these vertices, which may be repeated."""
+        return dataclasses.replace(self, changes=self.changes[np.searchsorted(self.own, vertices)])
 
 
-UNPAINTED = _Coated((), np.zeros((0, 0), np.float32), ())
+NO_VERTICES = np.zeros(0, np.int64)
+UNPAINTED = _Coated((), np.zeros((0, 0), np.float32), (), NO_VERTICES)
 
 
 class ShapeTable:
@@ -185,14 +191,28 @@ class ShapeTable:
         self._kept = kept
         return _extended(base, mesh.material, found)
 
-    def at(self, scene: Scene, materials: Sequence[MaterialId], material: I32, uvs: F32) -> Shapes:
-        """For points of our own, material (P,) and uvs (P, 2), at which pictures are not averaged."""
+    def at(
+        self,
+        scene: Scene,
+        materials: Sequence[MaterialId],
+        material: I32,
+        uvs: F32,
+        mesh: WorldMesh | None = None,
+        vertex: I64 = NO_VERTICES,
+    ) -> Shapes:
+        """For points of our own, material (P,) and uvs (P, 2), at which pictures are not averaged.
+
+        With a mesh, paint is that of the vertices (P,) of it that the points are nearest to.
+        """
         base, varying = self._begun(scene, materials)
+        coated = {} if mesh is None else self._coated(scene, materials, mesh)
+        varying |= {m: resolve(scene.material(materials[m]), self._registry) for m in coated}
         found = []
         for number, resolved in varying.items():
             own = np.flatnonzero(material == number)
             nothing = np.zeros(len(own), np.float32)
-            found.append((number, resolved, own, self._steps(resolved, uvs[own], nothing, UNPAINTED)))
+            coat = coated[number].at(vertex[own]) if number in coated else UNPAINTED
+            found.append((number, resolved, own, self._steps(resolved, uvs[own], nothing, coat)))
         return _extended(base, material, found) if found else base
 
     def _begun(self, scene: Scene, materials: Sequence[MaterialId]) -> tuple[Shapes, dict[int, Resolved]]:
@@ -236,7 +256,7 @@ class ShapeTable:
                 for column, name in enumerate(names):
                     if name in changes:
                         changed[rows, column] = changes[name]
-            made[m] = _Coated(names, changed, tuple(coat for coat, _, _ in coats))
+            made[m] = _Coated(names, changed, tuple(coat for coat, _, _ in coats), own)
         return made
 
     def _steps(self, resolved: Resolved, uvs: F32, area: F32, coat: _Coated) -> Steps:
@@ -248,7 +268,7 @@ class ShapeTable:
             ranges.append(grey.range)
         for column in coat.changes.T if coat.names else ():
             values.append(column)
-            ranges.append((float(column.min()), float(column.max())))
+            ranges.append((float(column.min(initial=0)), float(column.max(initial=0))))
         made = stepped(np.stack(values, axis=1), ranges)
         return dataclasses.replace(made, painted=coat.names)
 

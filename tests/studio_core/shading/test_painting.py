@@ -15,12 +15,15 @@ from studio_core.scene.diff import Changes, diff
 from studio_core.scene.nodes import Camera, Material, MeshObject, PointLamp, Scene
 from studio_core.scene.paint import Paint
 from studio_core.scene.transform import Transform, looking
-from studio_core.shading.artifacts import Shapes, Surfaces
+from studio_core.shading.artifacts import Casters, Lighting, Shapes, Surfaces
 from studio_core.shading.coefficients import CoefficientTable
+from studio_core.shading.error_meter import ErrorMeter
 from studio_core.shading.frame import Frame
 from studio_core.shading.job import Job
 from studio_core.shading.offline import backend_params, scene_view
 from studio_core.shading.painting import coefficient_changes, painted
+from studio_core.shading.path_tracing import PathSettings, chosen_points, indirect_layer
+from studio_core.shading.path_world import PathWorlds
 from studio_core.shading.pipeline import Pipeline
 
 
@@ -101,6 +104,41 @@ def test_paint_follows_its_object_and_edits_redo_only_what_depends_on_it(service
     made = pipeline.update(frame_of(moved, host), diff(after, moved), Job("shade")).linear
     fresh = pipeline_of(services, host).update(frame_of(moved, host), Changes(), Job("shade")).linear
     np.testing.assert_allclose(made, fresh, rtol=1e-5, atol=1e-6)
+
+
+@pytest.mark.parametrize("model", ["phong", "ggx"])
+def test_the_truth_sees_paint(model, services, host):
+    pipeline = pipeline_of(services, host)
+    frame = frame_of(scene_of(model, everywhere(CHANGES[model])), host)
+    pipeline.update(frame, Changes(), Job("shade"))
+    error = ErrorMeter(services, 200)(pipeline, frame, Job("measure"))
+    assert error.vertices.relative_rmse < 2e-3
+    assert error.picture.relative_rmse < 0.02
+
+
+def test_paths_see_paint(services, host):
+    layers = []
+    other = {"base_color": (0.3, 0.5, 0.4), "metallic": 0.5, "roughness": 0.55}
+    for paint, values in ((everywhere(CHANGES["ggx"]), None), (None, other), (None, None)):
+        scene = scene_of("ggx", paint, values)
+        beside = box((3, 0.02, 3), (-1.5, -0.02, -1.5))
+        white = Material(id="w", values=frozen_map({"base_color": (0.8, 0.8, 0.8)}))
+        scene = scene.with_materials(white).with_nodes(
+            MeshObject(id="floor", geometry=beside, materials=("w",))
+        )
+        pipeline, frame = pipeline_of(services, host), frame_of(scene, host)
+        pipeline.update(frame, Changes(), Job("shade"))
+        surfaces, casters = pipeline.artifact(Surfaces), pipeline.artifact(Casters)
+        lighting, shapes = pipeline.artifact(Lighting), pipeline.artifact(Shapes)
+        mesh = surfaces.unrefined.mesh
+        near = np.abs(mesh.positions[:, 0] - 0.7) < 0.15
+        rows = np.flatnonzero(near & (mesh.normals[:, 1] > 0.9) & (np.abs(mesh.positions[:, 2]) < 0.4))
+        world = PathWorlds(services.registry)(scene, surfaces, casters, lighting)
+        given = (chosen_points(mesh, rows), shapes.of_points(rows), np.array([1.6, 1.4, 2.0]), world)
+        made = indirect_layer(*given, PathSettings(1, 4096), services.workers, Job("paths"))
+        layers.append(made.irradiance.mean(axis=0))
+    np.testing.assert_allclose(layers[0], layers[1], rtol=0.02)
+    assert np.abs(layers[0] / layers[2] - 1).max() > 0.1
 
 
 def test_the_table_stays_while_nothing_of_it_changes(services, host):

@@ -101,7 +101,7 @@ class Follower:
     def _light(self, active: I64, paths: Paths) -> None:
         world, shapes = self.world, self.world.shapes
         if shapes.row is not None:
-            shapes = world.shapes_at(paths.material[active], paths.uv[active])
+            shapes = world.shapes_at(paths.material[active], paths.uv[active], paths.vertex[active])
             assert shapes.row is not None
             paths.row[active] = shapes.row
         lit: Any = (world.tracer, world.looks, world.models, shapes.offset, shapes.data, world.lights, paths)
