@@ -13,7 +13,6 @@ from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
-from scipy.spatial import cKDTree
 
 from studio_core.arrays import frozen_map, readonly
 from studio_core.scene.geometry import Table
@@ -90,6 +89,8 @@ class Paint:
 
     def weights(self, places: npt.ArrayLike, normals: npt.ArrayLike, slots: npt.ArrayLike) -> Weights:
         """How much each of the nearest points counts at places (P, 3) with normals (P, 3) and slots (P,)."""
+        from scipy.spatial import cKDTree  # heavy: whoever reads a scene shall not wait for it
+
         where, facing = np.asarray(places, np.float64), np.asarray(normals, np.float64)
         slot = np.asarray(slots, np.int64)
         near = min(NEAREST, len(self.places))

@@ -9,6 +9,7 @@ from studio_core.contract import Registry
 from studio_core.scene.nodes import Light, Scene
 from studio_core.shading.artifacts import Radiance, Surfaces
 from studio_core.shading.materials import coefficients, resolve
+from studio_core.shading.painting import PaintTable
 
 
 def vertex_radiance(scene: Scene, radiance: Radiance, registry: Registry) -> npt.NDArray[np.float32]:
@@ -36,7 +37,8 @@ def vertex_weights(
         else:
             texture = next(iter(resolved.textures.values()))
             made[own] = bilinear(table, texture.placed(mesh.uvs[own]))
-    return made
+    painted = PaintTable(registry)(scene, surfaces.materials, mesh, width)
+    return made + painted.reshape(made.shape) if len(painted) else made
 
 
 def bilinear(table: npt.NDArray[np.float32], uv: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:

@@ -30,6 +30,7 @@ from studio_core.shading.coefficients import (
     uv_map_of,
 )
 from studio_core.shading.materials import Resolved, coefficients, linear_rgb, resolve
+from studio_core.shading.painting import PaintTable
 from studio_core.shading.pyramids import Pyramid
 
 F32 = npt.NDArray[np.float32]
@@ -137,6 +138,8 @@ class VertexCoefficients:
         self._mesh: tuple[object, ...] = ()
         self._own: dict[int, _Own] = {}
         self._made: tuple[tuple[_Look, ...], F32] | None = None
+        self._paint = PaintTable(services.registry)
+        self._coated: tuple[F32, F32, F32] | None = None
         self.touched: npt.NDArray[np.bool_] = np.zeros(0, np.bool_)
 
     def __call__(self, scene: Scene, surfaces: Surfaces) -> F32:
@@ -144,6 +147,26 @@ class VertexCoefficients:
 
         `touched` (V,) tells which vertices may differ from the call before.
         """
+        plain, before = self._plain(scene, surfaces), self._coated
+        width = plain.shape[1]
+        painted = self._paint(scene, surfaces.materials, surfaces.mesh, width)
+        if before is not None and before[0] is plain and before[1] is painted:
+            return before[2]
+        if before is not None and before[1] is not painted:
+            for coat in (before[1], painted):
+                if len(coat) == len(plain):
+                    self.touched = self.touched | coat.any(axis=1)
+                elif len(coat):
+                    self.touched = np.ones(len(plain), np.bool_)
+        made = plain
+        if len(painted):
+            made = plain + painted.reshape(plain.shape)
+            made.setflags(write=False)
+        self._coated = plain, painted, made
+        return made
+
+    def _plain(self, scene: Scene, surfaces: Surfaces) -> F32:
+        """Without what strokes changed."""
         mesh = surfaces.mesh
         looks = self._looked(scene, surfaces.materials)
         known = (mesh.uvs, mesh.material, mesh.faces, mesh.back_faces)

@@ -35,7 +35,7 @@ from studio_core.scene.nodes import (
 from studio_core.scene.transform import IDENTITY, Transform
 from studio_plugins.export.gltf_buffer import Buffer, write_glb
 from studio_plugins.export.gltf_materials import Json, Materials
-from studio_plugins.export.photographed import without_catchers
+from studio_plugins.export.photographed import paint_notes, without_catchers
 from studio_plugins.export.shaded import shaded_parts
 
 LIGHTS = "KHR_lights_punctual"
@@ -59,7 +59,7 @@ class GlbExporter:
             write_glb(Path(path), document, writer.buffer)
         except OSError as error:
             raise InputError(f"{path} cannot be written: {error.strerror or error}") from None
-        return tuple(photograph + writer.materials.notes + writer.notes)
+        return tuple(photograph + paint_notes(scene) + writer.materials.notes + writer.notes)
 
 
 class _Writer:

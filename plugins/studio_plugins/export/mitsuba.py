@@ -26,7 +26,7 @@ from studio_core.scene.nodes import MaterialId, MeshObject, Scene
 from studio_plugins.export.mitsuba_lights import add_cameras, add_lights
 from studio_plugins.export.mitsuba_materials import Materials
 from studio_plugins.export.mitsuba_xml import matrix, prop, put, ref
-from studio_plugins.export.photographed import background_notes, without_catchers
+from studio_plugins.export.photographed import background_notes, paint_notes, without_catchers
 from studio_plugins.export.shaded import ShadedPart, shaded_parts
 
 SHIPPED = {
@@ -78,7 +78,7 @@ class MitsubaExporter:
         integrator = put(root, "integrator", "path")
         prop(integrator, "integer", "max_depth", "$max_depth")
         prop(integrator, "boolean", "hide_emitters", not visible)
-        notes = photograph + background_notes(scene) + materials.notes + notes
+        notes = photograph + background_notes(scene) + paint_notes(scene) + materials.notes + notes
         for note in notes:
             root.insert(0, Comment(re.sub(r"-+", "-", f" {note} ")))
         indent(root)

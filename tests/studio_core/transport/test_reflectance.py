@@ -17,7 +17,8 @@ from studio_core.arrays import frozen_map
 from studio_core.contract import Services
 from studio_core.registry import PluginHost
 from studio_core.scene.geometry import Geometry, Image, Texture
-from studio_core.scene.nodes import Material, Scene
+from studio_core.scene.nodes import Material, MeshObject, Scene
+from studio_core.scene.paint import Paint
 from studio_core.scene.shading_mesh import shade_mesh
 from studio_core.scene.transform import Transform
 from studio_core.scene.world_mesh import Placed, WorldMesh, assemble
@@ -220,3 +221,27 @@ def test_both_sides_of_an_open_surface_have_their_own(host: PluginHost) -> None:
     assert (mesh.side != mesh.side[0]).any()
     assert np.ptp(found, axis=0).max() < 1e-6
     assert found.min() > 0
+
+
+def test_paint_is_added_and_marks_what_it_touches(host: PluginHost) -> None:
+    grey = Material(id="m", name="m", values=frozen_map({"base_color": (0.5, 0.5, 0.5)}))
+    shaded = shade_mesh(floor(2.0), 0.25)
+    two = [Placed(name, shaded, Transform((at, 0.0, 0.0)), (0,)) for name, at in (("a", 0.0), ("b", 3.0))]
+    mesh = assemble(two)
+    one = Paint.of(
+        shaded.positions, shaded.normals, shaded.slot, {"base_color": np.full((len(shaded), 3), 0.2)}
+    )
+    things = [MeshObject(id=name, geometry=floor(2.0), materials=("m",)) for name in "ab"]
+    scene = Scene().with_materials(grey).with_nodes(*things)
+    coated = scene.with_nodes(dataclasses.replace(things[1], paint=one))
+    make, surfaces = maker(host), surfaces_of(mesh, grey)
+    before = make(scene, surfaces)
+    after = make(coated, surfaces)
+    own = mesh.object == 1
+    np.testing.assert_array_equal(make.touched, own)
+    np.testing.assert_array_equal(after[~own], before[~own])
+    np.testing.assert_allclose(after[own], before[own] * 0.7 / 0.5, rtol=1e-5)
+    assert make(coated, surfaces) is after
+    assert not make.touched.any()
+    np.testing.assert_array_equal(make(scene, surfaces), before)
+    np.testing.assert_array_equal(make.touched, own)
