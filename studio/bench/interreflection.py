@@ -299,16 +299,17 @@ class Case:
 
     def peers(self) -> None:
         """Pictures: Mitsuba's seconds to the error of ours, over ours, after an edit and from nothing."""
-        from studio.bench.interreflection_peers import path_peer
+        from studio.bench.interreflection_peers import path_peer, without_sky
 
         self.say("against Mitsuba")
         setup = self.setup
         view = self.seen(self.one.scene, setup.peer)
         editor = self.editor("peers", view=view)
-        editor.go(self.one.scene, False)
-        scene = EDITS["light"](self.one, 3)[0]
+        editor.go(without_sky(self.one.scene), False)
+        scene = without_sky(EDITS["light"](self.one, 3)[0])
         step, picture = editor.go(scene, True)
-        peer = path_peer(scene, self.program, setup.peer, BOUNCES, setup.samples, setup.converged)
+        given = (scene, self.program, setup.peer, BOUNCES, setup.samples, setup.converged)
+        peer = path_peer(*given, picture.distance)
         still = dataclasses.replace(view, antialias=STILL)
         rest, exact = self.editor("peers", refine=True, view=still).go(scene, False)
         for metric, one, made in (("", step, picture), ("_first", rest, exact)):
