@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from studio_core.params import Value
 from studio_core.scene.geometry import Table
-from studio_core.scene.nodes import Material, MeshObject, Node, Scene
+from studio_core.scene.nodes import Material, MeshObject, Node, NodeId, Scene
 
 if TYPE_CHECKING:
     from studio_core.capturing.artifacts import CaptureState
@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from studio_core.shading.cache import DiskCache
     from studio_core.shading.job import Job
     from studio_core.shading.pipeline import Stage
+    from studio_core.strokes.solution import Lit, Solution
 
 API = 1
 KINDS = (
@@ -273,6 +274,34 @@ class Fitter(Protocol):
         ...
 
 
+class StrokeSolver(Protocol):
+    """Finds the materials that explain painted light: kind `solver`."""
+
+    id: str
+    label: str
+    Params: type
+
+    def open(self, services: Services) -> StrokeRun:
+        """A run that remembers what surfaces see of each other; owned by the compute thread."""
+        ...
+
+
+class StrokeRun(Protocol):
+    """One scene's solver, over many edits."""
+
+    def solve(self, scene: Scene, strokes: Sequence[NodeId], lit: Lit, params: Any, job: Job) -> Solution:
+        """The edit that explains the strokes (nodes of the scene; hidden ones are left out) together.
+
+        Strokes that say nothing (on the background, in full shadow, on what has no material that can
+        change) are left out with a note. Raises Cancelled, and nothing else for strange strokes.
+        """
+        ...
+
+    def likeness(self, scene: Scene, stroke: NodeId, lit: Lit, params: Any, job: Job) -> Any:
+        """(V,) float32, 0 … 1: how much each vertex of `lit.surfaces.unrefined` would change with it."""
+        ...
+
+
 @dataclass(frozen=True)
 class Services:
     """What the composition root hands to backends: threads, registry, cache folder."""
@@ -300,5 +329,7 @@ __all__ = [
     "SampledBrdf",
     "Services",
     "ShadingBackend",
+    "StrokeRun",
+    "StrokeSolver",
     "TabulatedBrdf",
 ]

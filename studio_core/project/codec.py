@@ -23,6 +23,7 @@ from studio_core.scene.capture import Capture
 from studio_core.scene.geometry import Geometry, Image, Table
 from studio_core.scene.nodes import Material, Node, Scene
 from studio_core.scene.room import Room
+from studio_core.strokes.stroke import Stroke
 
 TAGS: Mapping[str, type[Any]] = {
     "group": nodes.Group,
@@ -35,6 +36,7 @@ TAGS: Mapping[str, type[Any]] = {
     "directional_lamp": nodes.DirectionalLamp,
     "area_lamp": nodes.AreaLamp,
     "capture": Capture,
+    "stroke": Stroke,
     "material": nodes.Material,
 }
 _TAG_OF = {cls: tag for tag, cls in TAGS.items()}

@@ -23,6 +23,7 @@ from studio_core.scene.nodes import (
     Scene,
 )
 from studio_core.scene.room import Room
+from studio_core.strokes.stroke import Stroke
 
 
 class Aspect(Flag):
@@ -58,8 +59,8 @@ _MADE_FROM = {f.name for f in fields(Room)} - {f.name for f in fields(MeshObject
 class Changes:
     """Nodes by what changed on them, and materials.
 
-    Added and removed nodes have STRUCTURE; cameras and captures only ever NAME: they light
-    nothing.
+    Added and removed nodes have STRUCTURE; cameras, captures and strokes only ever NAME: they light
+    nothing, and what strokes change is paint.
     """
 
     nodes: Mapping[NodeId, Aspect] = field(default_factory=frozen_map)
@@ -124,7 +125,7 @@ def diff(before: Scene, after: Scene) -> Changes:
                 nodes[below] = nodes.get(below, Aspect.NONE) | inherited | _light(after[below], inherited)
     for node_id in nodes:
         there = [scene.nodes[node_id] for scene in (before, after) if node_id in scene.nodes]
-        if all(isinstance(node, Camera | Capture) for node in there):
+        if all(isinstance(node, Camera | Capture | Stroke) for node in there):
             nodes[node_id] = Aspect.NAME  # no light depends on it, and who looks through a camera has a view
     materials = {m for m, new in after.materials.items() if before.materials.get(m) is not new}
     materials |= before.materials.keys() - after.materials.keys()

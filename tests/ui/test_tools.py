@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 from PySide6.QtCore import QPoint, Qt
@@ -44,6 +46,17 @@ def press_keys(driver: Driver, keys: str) -> None:
 
 def place(driver: Driver, node: str = "stool") -> tuple[float, float, float]:
     return driver.document.scene.world(node).translation
+
+
+def hover(driver: Driver, at: QPoint, what: Callable[[], bool]) -> None:
+    """Go to a place without a button and stay about there, as a hand does, until something has happened."""
+
+    def seen() -> bool:
+        driver.move(at + QPoint(1, 0))
+        driver.move(at)
+        return what()
+
+    driver.until(seen)
 
 
 def words(driver: Driver) -> list[str]:
@@ -120,16 +133,14 @@ def test_axis_keys_without_a_button_follow_the_mouse_until_a_click(driver: Drive
     start = driver.at(STOOL)
     driver.move(start)
     press_keys(driver, "x")
-    driver.move(start + QPoint(2, 0))  # a hand moves on; the first move may say where it is
-    driver.move(start + QPoint(50, 0))
-    driver.until(lambda: place(driver)[0] > 1.1)
+    assert driver.document.in_gesture
+    hover(driver, start + QPoint(50, 0), lambda: place(driver)[0] > 1.1)
     moved = place(driver)
     driver.bot.mouseClick(driver.viewport, Qt.MouseButton.LeftButton, NONE, start + QPoint(50, 0))
     assert not driver.document.in_gesture
     assert len(driver.labels()) == 2
     press_keys(driver, "x")
-    driver.move(start + QPoint(-90, 0))
-    driver.until(lambda: place(driver) != moved)
+    hover(driver, start + QPoint(-90, 0), lambda: place(driver) != moved)
     driver.press(start, NONE, Qt.MouseButton.RightButton)
     driver.release(start, NONE, Qt.MouseButton.RightButton)
     assert place(driver) == moved

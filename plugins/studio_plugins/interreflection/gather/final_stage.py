@@ -193,7 +193,8 @@ class FinalStage:
             "rounds": float(sent.sources.steps),
             "bytes": float(held + sent.nbytes + separated.nbytes + self._neighbours.nbytes),
         }
-        return Indirect(inputs[Surfaces], layer, wanted, tier.last, counts, facts)
+        known = sent.sources.light, sent.surface
+        return Indirect(inputs[Surfaces], layer, wanted, tier.last, counts, facts, known)
 
 
 def _needed(vertices: I64, way: Facing) -> I64:

@@ -1,0 +1,53 @@
+"""The stroke as a node: its tool, its marks, and what the designer decided about it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+from studio_core.params import param
+from studio_core.scene.geometry import Table
+from studio_core.scene.nodes import Node, NodeId
+from studio_core.strokes.marks import Marks
+
+REPLACE, BRIGHTEN, DARKEN, BLUR = "replace", "brighten", "darken", "blur"
+SHARPEN, CLONE, SMEAR, FIXATE = "sharpen", "clone", "smear", "fixate"
+TOOLS = (REPLACE, BRIGHTEN, DARKEN, BLUR, SHARPEN, CLONE, SMEAR, FIXATE)
+AUTOMATIC, COLOUR, SHINE, GLOSS = "automatic", "colour", "shine", "gloss"
+MEANINGS = (
+    AUTOMATIC, COLOUR, SHINE, GLOSS, "colour and shine", "colour and gloss", "shine and gloss", "everything",
+)  # fmt: skip
+"""What of a material a stroke may change, in the designer's words."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Stroke(Node):
+    """Light that is wanted at places of `objects`; `hidden` strokes count for nothing.
+
+    `flat` tells that one colour was painted over everything: then its mean is meant, not its shape. `reach`
+    has σ_s, σ_n, σ_r of equation "s(x, y)" of section 4.3: how the change spreads to similar surface.
+    """
+
+    tool: str = param(REPLACE, "Tool", choices=TOOLS)
+    indirect: bool = param(
+        False, "Change what is reflected", "The surface stays as it is; what lights it or shows in it changes"
+    )
+    weight: float = param(1.0, "Weight", "How much it counts beside other strokes", low=0.0, high=100.0)
+    meaning: str = param(AUTOMATIC, "Means", "What of the material it changes", choices=MEANINGS)
+    flat: bool = False
+    near: float = param(0.0, "Nearness", "How much only near places change alike", low=0.0, high=100.0)
+    facing: float = param(0.0, "Direction", "How much only surfaces that face alike do", low=0.0, high=100.0)
+    alike: float = param(0.0, "Likeness", "How much only surfaces that look alike do", low=0.0, high=100.0)
+    objects: tuple[NodeId, ...] = ()
+    table: Table | None = None
+
+    @cached_property
+    def marks(self) -> Marks | None:
+        """What it says; None of one that holds nothing."""
+        return None if self.table is None else Marks.of_table(self.table)
+
+
+__all__ = [
+    "AUTOMATIC", "BLUR", "BRIGHTEN", "CLONE", "COLOUR", "DARKEN", "FIXATE", "GLOSS", "MEANINGS", "REPLACE",
+    "SHARPEN", "SHINE", "SMEAR", "TOOLS", "Stroke",
+]  # fmt: skip
