@@ -143,6 +143,28 @@ class TabulatedBrdf(Brdf, Protocol):
         ...
 
 
+class PaintableBrdf(Brdf, Protocol):
+    """A model whose parameters have parts to play in what a stroke means; models need not be.
+
+    `roles` names its parameters by "diffuse" (the colour of what is matte), "specular" (a colour or a number:
+    how much of the arriving light shines) and "gloss" (a number of the shape), as far as it has such. What
+    strokes change of the gloss, every vertex has of its own.
+    """
+
+    roles: Mapping[str, str]
+
+    def alpha(self, gloss: float) -> float:
+        """The roughness α of Ward's model at which highlights are about as wide, of models with a gloss.
+
+        Monotone; steps that are even in α look even.
+        """
+        ...
+
+    def gloss(self, alpha: float) -> float:
+        """The inverse of `alpha`; maybe beyond what the parameter allows."""
+        ...
+
+
 @dataclass(frozen=True)
 class ImportedModel:
     """Nodes and materials ready to be added, and in sentences what was repaired or left out."""
@@ -323,6 +345,7 @@ __all__ = [
     "Importer",
     "IndirectMethod",
     "Job",
+    "PaintableBrdf",
     "PanelMaker",
     "Plugin",
     "Registry",

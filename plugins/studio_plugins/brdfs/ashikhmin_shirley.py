@@ -29,6 +29,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from studio_core.arrays import frozen_map
 from studio_core.jit import batch_function, kernel
 from studio_core.kernels.brdf import (
     DENSITY_SIGNATURE,
@@ -163,6 +164,7 @@ class AshikhminShirley(Functions):
     functions = evaluate, sample, density
     terms = 3
     textures: tuple[str, ...] = ("diffuse", "specular")
+    roles: Mapping[str, str] = frozen_map({"diffuse": "diffuse", "specular": "specular"})
 
     def shape(self, values: Mapping[str, Value]) -> npt.NDArray[np.float32]:
         """(5,): the grain's direction, both exponents and the peak of p(h)."""

@@ -27,6 +27,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from studio_core.arrays import frozen_map
 from studio_core.jit import batch_function
 from studio_core.kernels.brdf import (
     DENSITY_SIGNATURE,
@@ -42,6 +43,7 @@ from studio_core.kernels.brdf import (
 from studio_core.kernels.lobes import draw_cosine, draw_half_power, weigh_cosine, weigh_half_power
 from studio_core.params import Value
 from studio_plugins.brdfs.functions import Functions
+from studio_plugins.brdfs.roles import Sharp
 from studio_plugins.brdfs.two_lobes import TwoLobeParams, TwoLobes, exponent, sharpness
 
 
@@ -90,13 +92,14 @@ def density(shape: Any, wo: Any, count: int, wi: Any, out: Any) -> None:
     weigh_half_power(o, carray(shape, 2)[0] + ONE, directions, terms[count:])
 
 
-class BlinnPhong(Functions, TwoLobes):
+class BlinnPhong(Sharp, Functions, TwoLobes):
     """See the module; satisfies `studio_core.contract.Brdf`."""
 
     id = "blinn-phong"
     label = "Blinn–Phong"
     Params = Params
     functions = evaluate, sample, density
+    roles: Mapping[str, str] = frozen_map({"diffuse": "diffuse", "specular": "specular", "gloss": "exponent"})
 
     def shape(self, values: Mapping[str, Value]) -> npt.NDArray[np.float32]:
         """(2,): exponent and the lobe's peak."""

@@ -28,6 +28,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from studio_core.arrays import frozen_map
 from studio_core.jit import batch_function, kernel
 from studio_core.kernels.brdf import (
     DENSITY_SIGNATURE,
@@ -47,6 +48,7 @@ from studio_core.params import Colour, Value, param
 from studio_plugins.brdfs.curves import curve, place, taken
 from studio_plugins.brdfs.fibres import pile
 from studio_plugins.brdfs.functions import Functions
+from studio_plugins.brdfs.roles import Rough
 
 _QUARTER = np.float32(0.25)
 
@@ -134,7 +136,7 @@ def density(shape: Any, wo: Any, count: int, wi: Any, out: Any) -> None:
         even[k] = HALF * INV_PI if (o[2] > ZERO and z[k] > ZERO) else ZERO
 
 
-class Cloth(Functions):
+class Cloth(Rough, Functions):
     """See the module; satisfies `studio_core.contract.Brdf`."""
 
     id = "cloth"
@@ -144,6 +146,9 @@ class Cloth(Functions):
     terms = 3
     textures: tuple[str, ...] = ("base_color", "sheen")
     shape_textures: tuple[str, ...] = ("roughness",)
+    roles: Mapping[str, str] = frozen_map(
+        {"diffuse": "base_color", "specular": "sheen", "gloss": "roughness"}
+    )
 
     def shape(self, values: Mapping[str, Value]) -> npt.NDArray[np.float32]:
         """(35,): n / 2, (2 + n) / 2π, 1 / T̄, and the curves of A and of T."""

@@ -39,7 +39,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from studio_core.jit import batch_function
+from studio_core.arrays import frozen_map
+from studio_core.jit import batch_function, kernel
 from studio_core.kernels.brdf import (
     DENSITY_SIGNATURE,
     HALF,
@@ -67,10 +68,17 @@ from studio_core.params import Colour, Value, param
 from studio_plugins.brdfs.curves import taken
 from studio_plugins.brdfs.facets import alpha_of, below_rim, lost, missing, rim
 from studio_plugins.brdfs.functions import Functions
+from studio_plugins.brdfs.roles import Rough
 
 _PLAIN, _COLOURED = 0.54, 0.81  # B = 0.54 − 0.81 (1 − Ē)
 _BEND = np.float32(0.51)
 _MOST = np.float32(0.08)  # F0 of what is not metal
+
+
+def keep_energy() -> Any:
+    """The field of light between facets."""
+    doc = "Light that bounces between facets; without it rough metals are darker"
+    return param(True, "Keep energy", doc)
 
 
 @dataclass(frozen=True)
@@ -85,25 +93,20 @@ class Params:
     specular: float = param(
         0.5, "Reflectance", "Of what is not metal: 0.5 reflects 4 % head-on", low=0.0, high=1.0
     )
-    keep_energy: bool = param(
-        True, "Keep energy", "Light that bounces between facets; without it rough metals are darker"
-    )
+    keep_energy: bool = keep_energy()
 
 
-@batch_function(SIGNATURE)
-def evaluate(shape: Any, wo: Any, count: int, wi: Any, out: Any) -> None:
-    """The four kernels of the module; see `studio_core.contract.Brdf`.
+@kernel
+def four_terms(s: Any, o: Any, directions: Any, terms: Any) -> None:
+    """The four kernels of the module, of directions (3 · count,), to terms (4 · count,).
 
-    shape: α, B / (π (1 − Ē)), (1 − B) / (π (1 − Ē)), 1 / (1 − Ȳ), and the curves of 1 − E and of the rim.
+    s: α, B / (π (1 − Ē)), (1 − B) / (π (1 − Ē)), 1 / (1 − Ȳ), and the curves of 1 − E and of the rim.
     """
-    s = carray(shape, 36)
+    count = len(directions) // 3
     alpha, plain, coloured, ground = s[0], s[1], s[2], s[3]
     missed, edge = taken(s, 4), taken(s, 20)
-    o = carray(wo, 3)
     ox, oy, oz = o[0], o[1], o[2]
-    directions = carray(wi, 3 * count)
     x, y, z = directions[:count], directions[count : 2 * count], directions[2 * count :]
-    terms = carray(out, 4 * count)
     b0, b1 = terms[:count], terms[count : 2 * count]
     b2, b3 = terms[2 * count : 3 * count], terms[3 * count :]
     seen = oz > ZERO
@@ -126,11 +129,9 @@ def evaluate(shape: Any, wo: Any, count: int, wi: Any, out: Any) -> None:
         b3[k] = coloured * bounced
 
 
-@batch_function(SAMPLE_SIGNATURE)
-def sample(shape: Any, wo: Any, term: int, count: int, u: Any, wi: Any) -> None:
-    """By the cosine, by visible normals, and as what bounced; see `studio_core.contract.SampledBrdf`."""
-    o, numbers, directions = carray(wo, 3), carray(u, 2 * count), carray(wi, 3 * count)
-    alpha = carray(shape, 1)[0]
+@kernel
+def draw(term: int, o: Any, alpha: np.float32, numbers: Any, directions: Any) -> None:
+    """For one of the four terms: by the cosine, by visible normals, or as what bounced."""
     if term == 0:
         draw_cosine(o, numbers, directions)
     elif term == 1:
@@ -141,18 +142,35 @@ def sample(shape: Any, wo: Any, term: int, count: int, u: Any, wi: Any) -> None:
         draw_bounced(o, alpha, numbers, directions)
 
 
-@batch_function(DENSITY_SIGNATURE)
-def density(shape: Any, wo: Any, count: int, wi: Any, out: Any) -> None:
-    """cos θ / π, that of `draw_skin`, G1 D / (4 n·ω_o), and that of `draw_bounced`."""
-    o, directions, terms = carray(wo, 3), carray(wi, 3 * count), carray(out, 4 * count)
-    alpha = carray(shape, 1)[0]
+@kernel
+def weigh(o: Any, alpha: np.float32, directions: Any, terms: Any) -> None:
+    """Densities (4 · count,) of `draw`: cos θ / π, that of `draw_skin`, G1 D / (4 n·ω_o), what bounced."""
+    count = len(directions) // 3
     weigh_cosine(o, directions, terms[:count])
     weigh_skin(o, alpha, directions, terms[count : 2 * count])
     weigh_visible(o, alpha, directions, terms[2 * count : 3 * count])
     weigh_bounced(o, alpha, directions, terms[3 * count :])
 
 
-class Ggx(Functions):
+@batch_function(SIGNATURE)
+def evaluate(shape: Any, wo: Any, count: int, wi: Any, out: Any) -> None:
+    """`four_terms`; see `studio_core.contract.Brdf`."""
+    four_terms(carray(shape, 36), carray(wo, 3), carray(wi, 3 * count), carray(out, 4 * count))
+
+
+@batch_function(SAMPLE_SIGNATURE)
+def sample(shape: Any, wo: Any, term: int, count: int, u: Any, wi: Any) -> None:
+    """`draw`; see `studio_core.contract.SampledBrdf`."""
+    draw(term, carray(wo, 3), carray(shape, 1)[0], carray(u, 2 * count), carray(wi, 3 * count))
+
+
+@batch_function(DENSITY_SIGNATURE)
+def density(shape: Any, wo: Any, count: int, wi: Any, out: Any) -> None:
+    """`weigh`; see `studio_core.contract.SampledBrdf`."""
+    weigh(carray(wo, 3), carray(shape, 1)[0], carray(wi, 3 * count), carray(out, 4 * count))
+
+
+class Ggx(Rough, Functions):
     """See the module; satisfies `studio_core.contract.Brdf`."""
 
     id = "ggx"
@@ -163,6 +181,9 @@ class Ggx(Functions):
     textures: tuple[str, ...] = ("base_color", "metallic", "specular")
     shape_textures: tuple[str, ...] = ("roughness",)
     straightened: tuple[int, ...] = (3,)
+    roles: Mapping[str, str] = frozen_map(
+        {"diffuse": "base_color", "specular": "specular", "gloss": "roughness"}
+    )
 
     def shape(self, values: Mapping[str, Value]) -> npt.NDArray[np.float32]:
         """(36,): α, B and 1 − B over π (1 − Ē), 1 / (1 − Ȳ), and the curves of 1 − E and of the rim."""
@@ -180,9 +201,15 @@ class Ggx(Functions):
         dielectric = _MOST * np.clip(np.asarray(values["specular"], np.float32), 0, 1)[..., None]
         matte = np.float32(1 / np.pi) * base * (1 - metallic) * (1 - dielectric)
         f0 = dielectric * (1 - metallic) + base * metallic
-        t = np.maximum(f0 - _MOST, 0) / (1 - _MOST)
-        bounced = (1 - _BEND) * t * t / (1 - _BEND * t) + base * (1 - metallic) * dielectric
+        bounced = bounced_share(f0) + base * (1 - metallic) * dielectric
         return np.stack(np.broadcast_arrays(matte, f0, np.ones_like(f0), bounced), axis=-2)
+
+
+def bounced_share(f0: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:
+    """g(F0) of the module."""
+    t = np.maximum(f0 - _MOST, 0) / (1 - _MOST)
+    made: npt.NDArray[np.float32] = (1 - _BEND) * t * t / (1 - _BEND * t)
+    return made
 
 
 MODEL = Ggx()

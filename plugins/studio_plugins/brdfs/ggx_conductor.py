@@ -29,6 +29,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from studio_core.arrays import frozen_map
 from studio_core.jit import batch_function
 from studio_core.kernels.brdf import (
     DENSITY_SIGNATURE,
@@ -49,6 +50,7 @@ from studio_plugins.brdfs.curves import taken
 from studio_plugins.brdfs.facets import alpha_of, average_bounce, lost, missing, surviving
 from studio_plugins.brdfs.functions import Functions
 from studio_plugins.brdfs.ggx_dielectric import roughness
+from studio_plugins.brdfs.roles import Rough
 
 _EDGE = 7 * (7 / 6) ** 6  # 1 / (u (1 − u)^6) at u = 1/7, where that is largest
 _U = (np.arange(2000) + 0.5) / 2000
@@ -118,7 +120,7 @@ def density(shape: Any, wo: Any, count: int, wi: Any, out: Any) -> None:
     weigh_bounced(o, alpha, directions, terms[3 * count :])
 
 
-class GgxConductor(Functions):
+class GgxConductor(Rough, Functions):
     """See the module; satisfies `studio_core.contract.Brdf`."""
 
     id = "ggx-conductor"
@@ -127,6 +129,7 @@ class GgxConductor(Functions):
     functions = evaluate, sample, density
     terms = 4
     textures: tuple[str, ...] = ("base_color", "edge_tint")
+    roles: Mapping[str, str] = frozen_map({"specular": "base_color", "gloss": "roughness"})
 
     def shape(self, values: Mapping[str, Value]) -> npt.NDArray[np.float32]:
         """(18,): α, 1 / (π (1 − Ē)), and the curve of 1 − E."""

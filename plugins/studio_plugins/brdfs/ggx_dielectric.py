@@ -24,6 +24,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from studio_core.arrays import frozen_map
 from studio_core.jit import batch_function
 from studio_core.kernels.brdf import (
     DENSITY_SIGNATURE,
@@ -43,6 +44,7 @@ from studio_core.params import Colour, Value, param
 from studio_plugins.brdfs.curves import taken
 from studio_plugins.brdfs.facets import alpha_of, lost, mean_fresnel, missing, surviving
 from studio_plugins.brdfs.functions import Functions
+from studio_plugins.brdfs.roles import Rough
 
 
 def ior(default: float = 1.5) -> Any:
@@ -110,7 +112,7 @@ def density(shape: Any, wo: Any, count: int, wi: Any, out: Any) -> None:
     weigh_skin(o, carray(shape, 1)[0], directions, terms)
 
 
-class GgxDielectric(Functions):
+class GgxDielectric(Rough, Functions):
     """See the module; satisfies `studio_core.contract.Brdf`."""
 
     id = "ggx-dielectric"
@@ -119,6 +121,7 @@ class GgxDielectric(Functions):
     functions = evaluate, sample, density
     terms = 1
     textures: tuple[str, ...] = ("tint",)
+    roles: Mapping[str, str] = frozen_map({"specular": "tint", "gloss": "roughness"})
 
     def shape(self, values: Mapping[str, Value]) -> npt.NDArray[np.float32]:
         """(19,): see `skin`."""

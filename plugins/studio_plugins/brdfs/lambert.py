@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from studio_core.arrays import frozen_map
 from studio_core.jit import batch_function
 from studio_core.kernels.brdf import DENSITY_SIGNATURE, ONE, SAMPLE_SIGNATURE, SIGNATURE, ZERO, carray
 from studio_core.kernels.lobes import draw_cosine, weigh_cosine
@@ -67,6 +68,7 @@ class Lambert(Functions):
     functions = evaluate, sample, density
     terms = 1
     textures: tuple[str, ...] = ("base_color",)
+    roles: Mapping[str, str] = frozen_map({"diffuse": "base_color"})
 
     def shape(self, values: Mapping[str, Value]) -> npt.NDArray[np.float32]:
         """Matte surfaces have no shape: (0,)."""

@@ -29,6 +29,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from studio_core.arrays import frozen_map
 from studio_core.jit import batch_function, kernel
 from studio_core.kernels.brdf import (
     DENSITY_SIGNATURE,
@@ -145,6 +146,7 @@ class OrenNayar(Functions):
     functions = evaluate, sample, density
     terms = 2
     textures: tuple[str, ...] = ("base_color",)
+    roles: Mapping[str, str] = frozen_map({"diffuse": "base_color"})
 
     def shape(self, values: Mapping[str, Value]) -> npt.NDArray[np.float32]:
         """(3,): r, A and the factor of b1."""

@@ -31,6 +31,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from studio_core.arrays import frozen_map
 from studio_core.jit import batch_function, kernel
 from studio_core.kernels.brdf import (
     DENSITY_SIGNATURE,
@@ -51,6 +52,7 @@ from studio_plugins.brdfs.curves import at, curve, place, taken
 from studio_plugins.brdfs.facets import hemispherical, left_out, lost, mean_fresnel, mean_passage
 from studio_plugins.brdfs.functions import Functions
 from studio_plugins.brdfs.ggx_dielectric import ior, roughness, skin
+from studio_plugins.brdfs.roles import Rough
 
 
 @dataclass(frozen=True)
@@ -123,7 +125,7 @@ def density(shape: Any, wo: Any, count: int, wi: Any, out: Any) -> None:
     weigh_cosine(o, directions, terms[count:])
 
 
-class Plastic(Functions):
+class Plastic(Rough, Functions):
     """See the module; satisfies `studio_core.contract.Brdf`."""
 
     id = "plastic"
@@ -132,6 +134,9 @@ class Plastic(Functions):
     functions = evaluate, sample, density
     terms = 2
     textures: tuple[str, ...] = ("base_color", "gloss")
+    roles: Mapping[str, str] = frozen_map(
+        {"diffuse": "base_color", "specular": "gloss", "gloss": "roughness"}
+    )
 
     def shape(self, values: Mapping[str, Value]) -> npt.NDArray[np.float32]:
         """(37,): what describes the skin, F_ms, 1 / (π T̄), and the curve of what facets let through."""

@@ -28,6 +28,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from studio_core.arrays import frozen_map
 from studio_core.jit import batch_function
 from studio_core.kernels.brdf import (
     DENSITY_SIGNATURE,
@@ -45,6 +46,7 @@ from studio_core.kernels.sampling import TURN, reflected
 from studio_core.params import Value, param
 from studio_plugins.brdfs.functions import Functions
 from studio_plugins.brdfs.grain import along, grain_direction
+from studio_plugins.brdfs.roles import Rough
 from studio_plugins.brdfs.two_lobes import TwoLobeParams, TwoLobes
 
 
@@ -120,13 +122,16 @@ def density(shape: Any, wo: Any, count: int, wi: Any, out: Any) -> None:
         lobe[k] = lit * peak * tilt / (TWO * hz) * exponential(-(gx * gx + gy * gy))
 
 
-class Ward(Functions, TwoLobes):
+class Ward(Rough, Functions, TwoLobes):
     """See the module; satisfies `studio_core.contract.Brdf`."""
 
     id = "ward"
     label = "Brushed (Ward)"
     Params = Params
     functions = evaluate, sample, density
+    roles: Mapping[str, str] = frozen_map(
+        {"diffuse": "diffuse", "specular": "specular", "gloss": "roughness"}
+    )
 
     def shape(self, values: Mapping[str, Value]) -> npt.NDArray[np.float32]:
         """(5,): the grain's direction, the inverse slopes and the peak."""

@@ -220,6 +220,26 @@ def test_pictures_of_the_shape_are_of_its_numbers_and_colour_nothing(model: Any)
 
 
 @every_model
+def test_roles_are_parameters_that_can_play_them(model: Any) -> None:
+    infos = param_infos(model.Params)
+    kinds = {"diffuse": {"colour"}, "specular": {"colour", "number"}, "gloss": {"number"}}
+    roles = getattr(model, "roles", {})
+    assert set(roles) <= set(kinds)
+    assert len(set(roles.values())) == len(roles)
+    for role, name in roles.items():
+        assert infos[name].kind in kinds[role], role
+        assert (name in shaping_of(model)[0]) == (role == "gloss"), role
+    if "gloss" in roles:
+        info = infos[roles["gloss"]]
+        walk = [at_fraction(info, f) for f in np.linspace(0, 1, 41)]
+        alphas = np.array([model.alpha(value) for value in walk])
+        assert 0 <= alphas.min() <= alphas.max() <= 1
+        rise = np.diff(alphas)
+        assert (rise > 0).all() or (rise < 0).all()
+        np.testing.assert_allclose([model.gloss(alpha) for alpha in alphas], walk, rtol=1e-9, atol=1e-12)
+
+
+@every_model
 def test_parameters_are_documented(model: Any) -> None:
     for name, info in param_infos(model.Params).items():
         assert info.label, name
