@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from oracles.facets import ggx, ggx_conductor, ggx_dielectric, plastic
+from oracles.facets import ggx, ggx_conductor, ggx_dielectric, plastic, specgloss
 from oracles.fibres import cloth
 
 Array = npt.NDArray[np.float64]
@@ -131,6 +131,7 @@ ORACLES: dict[str, Callable[[Values, Array, Array], Array]] = {
     "phong": phong,
     "blinn-phong": blinn_phong,
     "ggx": ggx,
+    "specgloss": specgloss,
     "ggx-conductor": ggx_conductor,
     "ggx-dielectric": ggx_dielectric,
     "plastic": plastic,

@@ -125,6 +125,24 @@ def ggx(values: Values, wo: Array, wi: Array) -> Array:
     return above[..., None] * (matte + specular)
 
 
+def specgloss(values: Values, wo: Array, wi: Array) -> Array:
+    """(..., 3) f_r of `specgloss`."""
+    above, no, ni, oh, lobe, alpha = _facets(values, wo, wi)
+    diffuse, f0 = (np.asarray(values[name], np.float64) for name in ("diffuse", "specular"))
+    f90 = min(50 * float(np.max(f0)), 1.0)
+    known = table(alpha)
+    left, mean = below_rim(alpha)
+    at = [left(np.log1p(mu / (0.3 * alpha))) for mu in (no, ni)]
+    under = f90 * at[0] * at[1] / (np.pi * mean) + (1 - f90) / np.pi
+    linear = 0.54 - 0.81 * known.missing
+    t = np.maximum(f0 - 0.08, 0) / 0.92
+    coloured = (1 - diffuse) * 0.49 * t**2 / (1 - 0.51 * t) + diffuse * f0
+    survives = (linear * f0 + (1 - linear) * coloured) * float(values.get("keep_energy", True))
+    schlick = f0 + (f90 - f0) * ((1 - oh) ** 5)[..., None]
+    specular = lobe[..., None] * schlick + known.multiple(no, ni)[..., None] * survives
+    return above[..., None] * (under[..., None] * diffuse * (1 - f0) + specular)
+
+
 def ggx_dielectric(values: Values, wo: Array, wi: Array) -> Array:
     """(..., 3) f_r of `ggx-dielectric`."""
     above, no, ni, oh, lobe, alpha = _facets(values, wo, wi)

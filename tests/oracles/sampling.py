@@ -52,6 +52,10 @@ def ggx(values: Values, wo: Array, wi: Array) -> Array:
     return np.stack([cosine(wi), (1 - share) * lobe + share * bounced, lobe, bounced], -1)
 
 
+def specgloss(values: Values, wo: Array, wi: Array) -> Array:
+    return np.concatenate([ggx(values, wo, wi), cosine(wi)[..., None]], -1)
+
+
 def bounced_density(alpha: float, wi: Array) -> Array:
     """∝ cos θ / (cos² θ + α²)."""
     return cosine(wi) / (wi[..., 2] ** 2 + alpha**2) / np.log1p(1 / alpha**2)
@@ -71,4 +75,5 @@ DENSITIES: dict[str, Callable[[Any, Array, Array], Array]] = {
     "phong": phong,
     "blinn-phong": blinn_phong,
     "ggx": ggx,
+    "specgloss": specgloss,
 }

@@ -14,6 +14,7 @@ plugin = Plugin(
             "phong": f"{_HERE}.phong:MODEL",
             "blinn-phong": f"{_HERE}.blinn_phong:MODEL",
             "ggx": f"{_HERE}.ggx:MODEL",
+            "specgloss": f"{_HERE}.specgloss:MODEL",
             "ggx-conductor": f"{_HERE}.ggx_conductor:MODEL",
             "ggx-dielectric": f"{_HERE}.ggx_dielectric:MODEL",
             "plastic": f"{_HERE}.plastic:MODEL",
