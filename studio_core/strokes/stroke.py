@@ -24,6 +24,7 @@ MEANINGS = (
 class Stroke(Node):
     """Light that is wanted at places of `objects`; `hidden` strokes count for nothing.
 
+    Each is solved on what those before have made, or, `together` with the one before it, as one with that.
     `flat` tells that one colour was painted over everything: then its mean is meant, not its shape. `reach`
     has σ_s, σ_n, σ_r of equation "s(x, y)" of section 4.3: how the change spreads to similar surface.
     """
@@ -35,6 +36,7 @@ class Stroke(Node):
     weight: float = param(1.0, "Weight", "How much it counts beside other strokes", low=0.0, high=100.0)
     meaning: str = param(AUTOMATIC, "Means", "What of the material it changes", choices=MEANINGS)
     flat: bool = False
+    together: bool = param(False, "Together", "Explained together with the stroke before it")
     near: float = param(0.0, "Nearness", "How much only near places change alike", low=0.0, high=100.0)
     facing: float = param(0.0, "Direction", "How much only surfaces that face alike do", low=0.0, high=100.0)
     alike: float = param(0.0, "Likeness", "How much only surfaces that look alike do", low=0.0, high=100.0)

@@ -29,7 +29,7 @@ _ONE, _NONE = np.uint64(1), np.uint64(0)
 
 
 @kernel
-def _arriving(
+def arriving_from(
     kind: int, px: float, py: float, pz: float, lamp: F64, column: int, x: float, y: float, z: float
 ) -> tuple[float, float, float, float]:
     """Unit direction to a sample at p, and the share of its light that arrives at (x, y, z) face on.
@@ -131,7 +131,7 @@ def trace_pairs(
                     px, py, pz = place[row[i], column, 0], place[row[i], column, 1], place[row[i], column, 2]
                     x, y, z = float(near[i, 0]), float(near[i, 1]), float(near[i, 2])
                     nx, ny, nz = float(near[i, 3]), float(near[i, 4]), float(near[i, 5])
-                    dx, dy, dz, weight = _arriving(kind_of, px, py, pz, lamp, column, x, y, z)
+                    dx, dy, dz, weight = arriving_from(kind_of, px, py, pz, lamp, column, x, y, z)
                     if not (weight > 0.0 and dx * nx + dy * ny + dz * nz > 0.0):
                         continue
                     ox, oy, oz = near[i, 6], near[i, 7], near[i, 8]
@@ -323,7 +323,7 @@ def sum_light(
                 bits >>= _ONE
                 if not here:
                     continue
-                dx, dy, dz, weight = _arriving(
+                dx, dy, dz, weight = arriving_from(
                     kind[column],
                     place[variant, column, 0],
                     place[variant, column, 1],

@@ -14,14 +14,15 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Flag, auto
 
 import numpy as np
 
-from studio_plugins.slf.constrained import Found, Moments, fit_both, fit_diffuse, fit_specular
-from studio_plugins.slf.samples import F64, Reflectance, Samples
+from studio_plugins.slf.grams import Found, Grams
+from studio_plugins.slf.grams import best as best_of
+from studio_plugins.slf.samples import F64, Model, Reflectance, Samples
 
 PLACES = 30.0  # n_eff
 NOISE = 0.05
@@ -31,6 +32,8 @@ CLOSE = 2.0 * math.log(PLACES)
 TOLD = 0.02
 """Relative change that a stroke must be able to show, for it to say anything about a parameter."""
 TINTS_APART = 0.02
+APART = 0.25
+"""Levels that are nearer to today's are no change of gloss."""
 
 
 class Change(Flag):
@@ -84,12 +87,16 @@ class Verdict:
 
 
 def half_levels(levels: int) -> F64:
-    """(2 levels − 1,) all levels and those half way between."""
+    """Every level and the middles between them."""
     return np.arange(2 * levels - 1) / 2
 
 
 def decide(
-    samples: Samples, now: Reflectance, allowed: Sequence[Change] = EVERY, tints: Sequence[F64] = ()
+    samples: Samples,
+    model: Model,
+    now: Reflectance,
+    allowed: Sequence[Change] = EVERY,
+    tints: Sequence[F64] = (),
 ) -> Verdict:
     """What of `now` changes such that the samples come out; places with numbers that are none are left out.
 
@@ -102,67 +109,77 @@ def decide(
         nothing = Explanation(Change.NONE, now, 0.0, 0.0, 0.0)
         return Verdict((nothing,), Change.DIFFUSE | Change.SPECULAR | Change.GLOSS)
     importance = samples.importance
-
-    def left(reflectance: Reflectance) -> float:
-        squares = importance * (samples.made(reflectance) - samples.wanted) ** 2
-        return float(squares.sum() / total)
-
     before = float((importance * (samples.before - samples.wanted) ** 2).sum() / total)
+    every = Grams.of(samples, half_levels(samples.levels), importance)
+    here = Grams.of(samples, np.array([now.level]), importance, samples.own[None])
+    others = every.some(np.flatnonzero(np.abs(every.levels - now.level) > APART))
     made = []
     for change in allowed:
-        found = []
-        for reflectance, extra in _candidates(change, samples, now, tints):
-            rest = left(reflectance)
-            score = PLACES * math.log(rest + NOISE**2) + (change.cost + extra) * math.log(PLACES)
-            explained = 1 - rest / before if before > 0 else 0.0
-            found.append(Explanation(change, reflectance, rest, score, explained))
-        if found:
-            made.append(min(found, key=lambda one: one.score))
-    made.sort(key=lambda one: (one.score, one.change.cost))
-    return Verdict(tuple(made), _silent(samples, now, importance, total))
+        grams, diffuse = others if Change.GLOSS in change else here, Change.DIFFUSE in change
+        found = [(_finer(samples, importance, grams, model, now, diffuse, None), 0)]
+        if Change.SPECULAR in change:
+            offered = [(now.tint, 0)]
+            offered += [(t / max(t.max(), 1e-9), 2) for t in tints if _apart(t, now.tint)]
+            found = [
+                (_finer(samples, importance, grams, model, now, diffuse, tint), extra)
+                for tint, extra in offered
+            ]
+        for one, extra in found:
+            left = one.left / total
+            score = PLACES * math.log(left + NOISE**2) + (change.cost + extra) * math.log(PLACES)
+            explained = 1 - left / before if before > 0 else 0.0
+            made.append(Explanation(change, one.reflectance, left, score, explained))
+    best: dict[Change, Explanation] = {}
+    for explanation in made:
+        if explanation.change not in best or explanation.score < best[explanation.change].score:
+            best[explanation.change] = explanation
+    ranked = sorted(best.values(), key=lambda one: (one.score, one.change.cost))
+    return Verdict(tuple(ranked), _silent(samples, model, now, importance, total))
 
 
-def _candidates(
-    change: Change, samples: Samples, now: Reflectance, tints: Sequence[F64]
-) -> Iterator[tuple[Reflectance, int]]:
-    """The best reflectance of each level and tint, with what its tint costs."""
-    levels = np.array([now.level])
-    if Change.GLOSS in change:
-        levels = half_levels(samples.levels)
-        levels = levels[np.abs(levels - now.level) > 0.25]
-    if Change.SPECULAR not in change:
-        if Change.DIFFUSE not in change:
-            for level in levels:
-                yield Reflectance(now.diffuse, now.specular, float(level)), 0
-            return
-        yield from _of(fit_diffuse(Moments.of(samples, levels), now), levels, 0)
-        return
-    moments = Moments.of(samples, levels)
-    fit = fit_both if Change.DIFFUSE in change else fit_specular
-    own = now.tint
-    yield from _of(fit(moments, now, own), levels, 0)
-    for tint in tints:
-        if np.abs(tint - own).max() > TINTS_APART:
-            yield from _of(fit(moments, now, tint), levels, 2)
+def _finer(
+    samples: Samples,
+    importance: F64,
+    grams: Grams,
+    model: Model,
+    now: Reflectance,
+    diffuse: bool,
+    tint: F64 | None,
+) -> Found:
+    """The best at the levels, and then between them where there are several."""
+    found = best_of(grams, model, now, diffuse, tint)
+    if len(grams.levels) > 1:
+        about = found.reflectance.level + np.array([-0.25, -0.125, 0.125, 0.25])
+        about = np.clip(about, 0, samples.levels - 1)
+        again = best_of(Grams.of(samples, about, importance), model, now, diffuse, tint)
+        if again.left < found.left:
+            return again
+    return found
 
 
-def _of(found: Found, levels: F64, extra: int) -> Iterator[tuple[Reflectance, int]]:
-    for diffuse, specular, level in zip(found.diffuse, found.specular, levels, strict=True):
-        yield Reflectance(diffuse, specular, float(level)), extra
+def _apart(tint: F64, own: F64) -> bool:
+    return bool(np.abs(tint / max(tint.max(), 1e-9) - own).max() > TINTS_APART)
 
 
-def _silent(samples: Samples, now: Reflectance, importance: F64, total: float) -> Change:
+def _silent(samples: Samples, model: Model, now: Reflectance, importance: F64, total: float) -> Change:
     """Parameters that these places would hardly show, however they changed."""
 
-    def shows(change: F64) -> bool:
+    def shows(one: Reflectance, other: Reflectance, own: bool = True) -> bool:
+        change = samples.made(model, one, own) - samples.made(model, other, own)
         return math.sqrt((importance * change**2).sum() / total) > TOLD
 
-    silent = Change.NONE
-    if not shows(samples.diffuse * np.maximum(1 - now.specular, 0)):
+    def shine(level: float) -> Reflectance:
+        return Reflectance(now.diffuse, now.specular, level)
+
+    silent, nothing = Change.NONE, np.zeros(3)
+    if not shows(
+        Reflectance(nothing, now.specular, now.level),
+        Reflectance(model.room(now.specular), now.specular, now.level),
+    ):
         silent |= Change.DIFFUSE
-    if not shows(samples.column(now.level) * now.tint):
+    if not shows(Reflectance(nothing, nothing, now.level), Reflectance(nothing, now.tint, now.level)):
         silent |= Change.SPECULAR
-    shine = samples.specular * np.maximum(now.specular, 0)
-    if not shows(shine.max(axis=0) - shine.min(axis=0)):
+    levels = np.linspace(0, samples.levels - 1, 5)
+    if not any(shows(shine(now.level), shine(float(level)), False) for level in levels):
         silent |= Change.GLOSS
     return silent

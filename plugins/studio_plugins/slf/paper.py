@@ -16,7 +16,6 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
-from studio_plugins.slf.constrained import PIVOT, TINY
 from studio_plugins.slf.samples import F64
 
 I64 = npt.NDArray[np.int64]
@@ -25,6 +24,9 @@ Solver = Literal["l0", "mixed", "l2"]
 WEIGHTS = (0.0, 1.0, 5.0, 25.0)
 """Of the residual, by how many parameters changed; one that changes nothing is weighed like one that does."""
 KEPT, DIFFUSE, SPECULAR, BOTH = range(4)
+PIVOT = 1e-6
+"""Columns whose angle has a smaller squared sine are one column."""
+TINY = 1e-300
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,15 +1,15 @@
-"""What a stroke says about one material: at places seen from a direction, the light that is wanted.
+"""What strokes say about one material: at places seen from somewhere, the light that is wanted.
 
-A surface sends L = d D + s S_g + rest, channel by channel: d and s are its matte and shiny reflectance,
-D and S_g the light that a white one would send at gloss level g (equation 3's two columns), and rest is all
-that neither changes.
+A surface sends L = Σ_k c_k(d, s) b_k(g), channel by channel: b_k is the light that term k of its reflectance
+model sends there with gloss level g and coefficient 1, and the coefficients follow from the matte and shiny
+reflectance. (Equation 3's two columns are the case of two terms with c = (d, s).)
 """
 
 from __future__ import annotations
 
 import dataclasses
 from dataclasses import dataclass
-from typing import Any
+from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -22,7 +22,7 @@ DARK = 0.1
 
 @dataclass(frozen=True, eq=False)
 class Reflectance:
-    """Matte (3,) and shiny (3,) albedo, and the gloss level, a real number from 0 to L − 1."""
+    """Matte (3,) and shiny (3,) reflectance, and the gloss level, a real number from 0 to L − 1."""
 
     diffuse: F64
     specular: F64
@@ -35,19 +35,30 @@ class Reflectance:
         return np.ones(3) if most <= 0 else np.asarray(self.specular / most)
 
 
+class Model(Protocol):
+    """How reflectance becomes coefficients, which are affine in the matte part."""
+
+    def coefficients(self, diffuse: F64, specular: F64) -> F64:
+        """(…, T, 3) of reflectances (…, 3)."""
+        ...
+
+    def room(self, specular: F64) -> F64:
+        """(…, 3) the largest matte part beside that shine, so that no more light returns than arrives."""
+        ...
+
+
 @dataclass(frozen=True, eq=False)
 class Samples:
-    """N places, as many as a stroke covers and what else is to stay as it is.
+    """N places, as many as strokes cover and what else is to stay as it is.
 
-    wanted, before (N, 3): light that was painted, and that was there. diffuse (N, 3), specular (L, N, 3): the
-    columns D and S_g, rest (N, 3) what is besides. weight (N,): how much a place counts.
+    wanted, before (N, 3): light that was painted, and that was there. terms (L, N, T, 3): the b_k at each
+    level, own (N, T, 3) with the gloss that there is now. weight (N,): how much a place counts.
     """
 
     wanted: F64
     before: F64
-    diffuse: F64
-    specular: F64
-    rest: F64
+    terms: F64
+    own: F64
     weight: F64
 
     def __post_init__(self) -> None:
@@ -60,30 +71,39 @@ class Samples:
 
     @property
     def levels(self) -> int:
-        """How many columns of shine there are."""
-        return len(self.specular)
+        """L."""
+        return len(self.terms)
 
     @property
     def finite(self) -> Bools:
         """(N,) places at which all numbers are numbers."""
-        good: Bools = np.isfinite(self.weight) & np.isfinite(self.specular).all(axis=(0, 2))
-        for one in (self.wanted, self.before, self.diffuse, self.rest):
-            good &= np.isfinite(one).all(axis=1)
-        return good
+        good: Bools = np.isfinite(self.weight) & np.isfinite(self.terms).all(axis=(0, 2, 3))
+        good &= np.isfinite(self.own).all(axis=(1, 2))
+        return good & np.isfinite(self.wanted).all(axis=1) & np.isfinite(self.before).all(axis=1)
 
-    def some(self, which: npt.NDArray[Any]) -> Samples:
+    def some(self, which: npt.NDArray[np.generic]) -> Samples:
         """These of them."""
-        wanted, before, diffuse = self.wanted[which], self.before[which], self.diffuse[which]
-        return Samples(wanted, before, diffuse, self.specular[:, which], self.rest[which], self.weight[which])
+        wanted, before, own = self.wanted[which], self.before[which], self.own[which]
+        return Samples(wanted, before, self.terms[:, which], own, self.weight[which])
 
     def __add__(self, other: Samples) -> Samples:
         """Both, of the same material."""
+        return Samples(
+            np.concatenate([self.wanted, other.wanted]),
+            np.concatenate([self.before, other.before]),
+            np.concatenate([self.terms, other.terms], axis=1),
+            np.concatenate([self.own, other.own]),
+            np.concatenate([self.weight, other.weight]),
+        )
 
-        def joined(name: str, axis: int = 0) -> F64:
-            return np.concatenate([getattr(self, name), getattr(other, name)], axis=axis)
-
-        plain = {name: joined(name) for name in ("wanted", "before", "diffuse", "rest", "weight")}
-        return Samples(**plain, specular=joined("specular", 1))
+    def mean(self) -> Samples:
+        """All as one place, which counts as much as they do together: what one flat colour can mean."""
+        total = self.weight.sum()
+        share = self.weight / total if total > 0 else self.weight
+        wanted, before = share @ self.wanted, share @ self.before
+        terms = np.einsum("n,lntc->ltc", share, self.terms)
+        own = np.einsum("n,ntc->tc", share, self.own)
+        return Samples(wanted[None], before[None], terms[:, None], own[None], np.array([total]))
 
     @property
     def importance(self) -> F64:
@@ -93,12 +113,14 @@ class Samples:
         scale = np.maximum(light + floor, 1e-30)
         return np.asarray(self.weight[:, None] / scale**2)
 
-    def column(self, level: float) -> F64:
-        """(N, 3) S at a level, between two by interpolation."""
-        low = int(np.clip(np.floor(level), 0, self.levels - 1))
-        high, share = min(low + 1, self.levels - 1), level - low
-        return np.asarray((1 - share) * self.specular[low] + share * self.specular[high])
+    def at(self, levels: F64) -> F64:
+        """(M, N, T, 3) terms at real levels (M,), between two by interpolation."""
+        low = np.clip(np.floor(levels), 0, self.levels - 1).astype(np.int64)
+        high = np.minimum(low + 1, self.levels - 1)
+        share = np.clip(levels - low, 0, 1)[:, None, None, None]
+        return np.asarray((1 - share) * self.terms[low] + share * self.terms[high])
 
-    def made(self, of: Reflectance) -> F64:
-        """(N, 3) the light that a reflectance sends."""
-        return np.asarray(of.diffuse * self.diffuse + of.specular * self.column(of.level) + self.rest)
+    def made(self, model: Model, of: Reflectance, own: bool = False) -> F64:
+        """(N, 3) the light that a reflectance sends, at its level or with the gloss that there is now."""
+        terms = self.own if own else self.at(np.array([of.level]))[0]
+        return np.asarray(np.einsum("ntc,tc->nc", terms, model.coefficients(of.diffuse, of.specular)))

@@ -28,13 +28,27 @@ def lights(rng, count=40, views=60):
     return diffuse.copy(), np.stack(specular)
 
 
+class TwoColumns:
+    """c = (d, s), d + s ≤ 1: equation 3."""
+
+    def coefficients(self, diffuse, specular):
+        return np.stack(np.broadcast_arrays(diffuse, specular), axis=-2)
+
+    def room(self, specular):
+        return np.clip(1 - specular, 0, 1)
+
+
+MODEL = TwoColumns()
+
+
 def painted(rng, now, then, noise=0.0, **given):
     """Samples that want `then` where `now` is, seen with noise of that relative size."""
     diffuse, specular = lights(rng, **given)
+    terms = np.stack([np.broadcast_to(diffuse, specular.shape), specular], axis=2)
     nothing = np.zeros_like(diffuse)
-    plain = Samples(nothing, nothing, diffuse, specular, nothing, np.ones(len(diffuse)))
-    wanted = plain.made(then) * (1 + noise * rng.normal(size=diffuse.shape))
-    return Samples(wanted, plain.made(now), diffuse, specular, nothing, np.ones(len(diffuse)))
+    plain = Samples(nothing, nothing, terms, terms[round(now.level)], np.ones(len(diffuse)))
+    wanted = plain.made(MODEL, then) * (1 + noise * rng.normal(size=diffuse.shape))
+    return Samples(wanted, plain.made(MODEL, now), terms, plain.own, np.ones(len(diffuse)))
 
 
 def reflectance(diffuse, specular, level):

@@ -6,7 +6,7 @@ import dataclasses
 
 import numpy as np
 import pytest
-from plugins.slf.strokes import painted, reflectance
+from plugins.slf.strokes import MODEL, painted, reflectance
 
 from studio_plugins.slf.joint import SINGLE, Change, decide
 
@@ -26,7 +26,7 @@ CHANGES = {
 def test_the_right_parameters_are_named_and_their_values_found(change, noise):
     right, off = 0, []
     for seed in range(30):
-        verdict = decide(painted(np.random.default_rng(seed), NOW, CHANGES[change], noise), NOW)
+        verdict = decide(painted(np.random.default_rng(seed), NOW, CHANGES[change], noise), MODEL, NOW)
         right += verdict.best.change == change
         if verdict.best.change == change:
             made, true = verdict.best.reflectance, CHANGES[change]
@@ -37,41 +37,41 @@ def test_the_right_parameters_are_named_and_their_values_found(change, noise):
 
 def test_a_stroke_on_what_no_light_reaches_says_nothing():
     samples = painted(np.random.default_rng(0), NOW, CHANGES[Change.DIFFUSE])
-    nothing = np.zeros_like(samples.diffuse)
-    dark = dataclasses.replace(samples, before=nothing, diffuse=nothing, specular=0 * samples.specular)
-    verdict = decide(dark, NOW)
+    dark = dataclasses.replace(samples, before=0 * samples.before, terms=0 * samples.terms, own=0 * samples.own)
+    verdict = decide(dark, MODEL, NOW)
     assert verdict.best.change == Change.NONE
     assert verdict.silent == Change.DIFFUSE | Change.SPECULAR | Change.GLOSS
-    assert decide(dark.some(np.zeros(0, int)), NOW).best.change == Change.NONE
+    assert decide(dark.some(np.zeros(0, int)), MODEL, NOW).best.change == Change.NONE
 
 
 def test_numbers_that_are_none_are_left_out():
     samples = painted(np.random.default_rng(0), NOW, CHANGES[Change.GLOSS])
-    before = decide(samples.some(np.arange(10, len(samples))), NOW)
-    samples.wanted[:5], samples.specular[3, 5:10] = np.nan, np.inf
-    after = decide(samples, NOW)
+    before = decide(samples.some(np.arange(10, len(samples))), MODEL, NOW)
+    samples.wanted[:5], samples.terms[3, 5:10, 1] = np.nan, np.inf
+    after = decide(samples, MODEL, NOW)
     assert after.best.change == before.best.change == Change.GLOSS
     assert after.best.score == pytest.approx(before.best.score)
 
 
 def test_where_no_highlight_is_seen_the_stroke_cannot_tell_of_it():
     samples = painted(np.random.default_rng(2), NOW, CHANGES[Change.DIFFUSE])
-    away = dataclasses.replace(samples, specular=1e-3 * samples.specular)
-    assert decide(away, NOW).silent == Change.SPECULAR | Change.GLOSS
-    assert decide(samples, NOW).silent == Change.NONE
+    faint = np.array([[1], [1e-3]])
+    away = dataclasses.replace(samples, terms=samples.terms * faint, own=samples.own * faint)
+    assert decide(away, MODEL, NOW).silent == Change.SPECULAR | Change.GLOSS
+    assert decide(samples, MODEL, NOW).silent == Change.NONE
 
 
 def test_another_colour_of_the_shine_is_found_among_those_that_are_offered():
     gold = np.array([1.0, 0.7, 0.3])
     samples = painted(np.random.default_rng(3), NOW, reflectance(NOW.diffuse, 0.45 * gold, 9), 0.02)
-    made = decide(samples, NOW, tints=[gold]).best
+    made = decide(samples, MODEL, NOW, tints=[gold]).best
     assert made.change == Change.SPECULAR
     np.testing.assert_allclose(made.reflectance.specular, 0.45 * gold, rtol=0.05)
 
 
 def test_single_changes_only_where_that_is_asked():
     samples = painted(np.random.default_rng(4), NOW, CHANGES[Change.SPECULAR | Change.GLOSS])
-    verdict = decide(samples, NOW, SINGLE)
+    verdict = decide(samples, MODEL, NOW, SINGLE)
     assert {one.change for one in verdict.explanations} == set(SINGLE)
     scores = [one.score for one in verdict.explanations]
     assert scores == sorted(scores)
