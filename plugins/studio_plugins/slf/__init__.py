@@ -1,12 +1,15 @@
 """Strokes on the surface light field: which material explains light that was painted.
 
 After slf-strokes.txt (Nguyen, Scherzer, Ritschel & Seidel, "Material Editing in Complex Scenes by Surface
-Light Field Manipulation and Reflectance Optimization", 2013). Solvers work on arrays; no tool paints yet.
+Light Field Manipulation and Reflectance Optimization", 2013).
 
-- what a stroke says: `samples`; the gloss that is tried: `ladder`
-- the material: `constrained` (exact minima among what returns no more light than arrives), `joint` (the
-  fewest numbers that explain a whole stroke), `paper` (the paper's choice, element by element)
-- where: `elements` (points that stand for all surfaces)
+- light: `places` (a stroke's marks in the world), `incident` (what reaches them), `columns` (what each term
+  of a model sends of it, at the gloss levels of `ladder`)
+- the material: `dressed` (a scene's material by its colour, shine and gloss), `samples`, `grams` (the best of
+  all that return no more light than arrives), `joint` (the fewest numbers that explain a whole stroke),
+  `paper` (the paper's choice, element by element)
+- where: `regions`, `elements` (points that stand for all surfaces)
+- `solver`: the door
 """
 
 from studio_core.contract import API, Plugin
@@ -17,8 +20,7 @@ plugin = Plugin(
     api=API,
     provides={
         "solver": {
-            "strokes-joint": "studio_plugins.slf.joint:decide",
-            "strokes-paper": "studio_plugins.slf.paper:choose",
+            "joint": "studio_plugins.slf.solver:SOLVER",
         },
     },
 )

@@ -45,6 +45,7 @@ def sums_at(
     """
     count = len(places)
     out = np.zeros((len(shapes), count, terms, 3))
+    given_shapes = np.ascontiguousarray(shapes, np.float32)
     sharp = np.array([alpha_of_level(level) < SHARP for level in range(len(shapes))])
     given = (
         np.ascontiguousarray(places.axes, np.float64), np.ascontiguousarray(places.wo, np.float32),
@@ -53,7 +54,19 @@ def sums_at(
     )  # fmt: skip
 
     def body(start: int, stop: int) -> None:
-        add_sums(address, terms, np.ascontiguousarray(shapes, np.float32), sharp, *given, pattern, WITHIN, PARTS, out, start, stop)
+        add_sums(
+            address,
+            terms,
+            given_shapes,
+            sharp,
+            *given,
+            pattern,
+            WITHIN,
+            PARTS,
+            out,
+            start,
+            stop,
+        )
 
     workers.run(count, 8, body, job)
     return out

@@ -1,7 +1,7 @@
-"""A scene's material as solvers see it: matte and shiny reflectance and a gloss level, whatever its model is.
+"""A material as solvers see it: matte and shiny reflectance and a gloss level, whatever its model is.
 
-Which parameters these are, the model says (`studio_core.contract.PaintableBrdf`). Coefficients are the model's
-own, so what is solved for is what is shaded.
+Which parameters these are, the model says (`studio_core.contract.PaintableBrdf`). Coefficients are the
+model's own, so what is solved for is what is shaded.
 """
 
 from __future__ import annotations
@@ -152,7 +152,8 @@ class Dressed:
         if "gloss" in self.roles:
             name = self.roles["gloss"]
             info = self.infos[name]
-            gloss = scalar(self.resolved.values[name]) * float(self._texel(self.resolved.shaping.get(name), uvs)[0])
+            texel = self._texel(self.resolved.shaping.get(name), uvs)
+            gloss = scalar(self.resolved.values[name]) * float(texel[0])
             change = float(np.asarray(changes.get(name, 0.0)).ravel()[0])
             gloss = gloss * math.exp(change) if info.scale == "log" else gloss + change
             gloss = float(np.clip(gloss, info.low, info.high))

@@ -108,9 +108,7 @@ class Incident:
             return np.zeros((0, 3), np.float32)
         return np.asarray(tree.radiance * np.asarray(node.gain(), np.float32), np.float32)
 
-    def _lamps(
-        self, scene: Scene, lit: Lit, places: Places, job: Checkpoints | None
-    ) -> tuple[F32, F32, int]:
+    def _lamps(self, scene: Scene, lit: Lit, places: Places, job: Checkpoints | None) -> tuple[F32, F32, int]:
         lighting, mesh = lit.lighting, lit.surfaces.unrefined.mesh
         parts = [lamp_samples(lamp, LAMP_SAMPLES, 1, 1) for lamp in lighting.lamps]
         if lighting.environment is not None and lighting.sun is not None:
@@ -145,7 +143,8 @@ class Incident:
 def _offsets(side: int) -> F32:
     """(side², 2) middles of equal parts of the unit square."""
     middle = (np.arange(side, dtype=np.float32) + 0.5) / side
-    return np.stack(np.meshgrid(middle, middle, indexing="ij"), axis=-1).reshape(-1, 2)
+    grid = np.stack(np.meshgrid(middle, middle, indexing="ij"), axis=-1)
+    return np.asarray(grid.reshape(-1, 2), np.float32)
 
 
 @kernel

@@ -37,7 +37,9 @@ def test_the_right_parameters_are_named_and_their_values_found(change, noise):
 
 def test_a_stroke_on_what_no_light_reaches_says_nothing():
     samples = painted(np.random.default_rng(0), NOW, CHANGES[Change.DIFFUSE])
-    dark = dataclasses.replace(samples, before=0 * samples.before, terms=0 * samples.terms, own=0 * samples.own)
+    dark = dataclasses.replace(
+        samples, before=0 * samples.before, terms=0 * samples.terms, own=0 * samples.own
+    )
     verdict = decide(dark, MODEL, NOW)
     assert verdict.best.change == Change.NONE
     assert verdict.silent == Change.DIFFUSE | Change.SPECULAR | Change.GLOSS
