@@ -20,10 +20,10 @@ LABELS = {"srgb": "Colour-true (sRGB)", "filmic": "Filmic (ACES)", "raw": "Raw (
 THUMBNAIL = 1 << 16  # pixels: up to here NumPy is quick enough, and no compiler need be loaded
 _STEPS = 1 << 16  # entries of a curve's table: 0.05 of an 8-bit step where sRGB is steepest
 _BLOCK = 1 << 14  # pixels at a time: stays in the cache
-_TO_FILM = np.array(
+TO_FILM = np.array(
     [[0.59719, 0.35458, 0.04823], [0.07600, 0.90834, 0.01566], [0.02840, 0.13383, 0.83777]], np.float32
 )
-_FROM_FILM = np.array(
+FROM_FILM = np.array(
     [[1.60475, -0.53108, -0.07367], [-0.10208, 1.10813, -0.00605], [-0.00327, -0.07276, 1.07602]], np.float32
 )
 _NO_FILM = np.zeros((0, 3), np.float32)
@@ -45,13 +45,13 @@ def tonemap(
     if len(flat) > THUMBNAIL:
         from studio_core.kernels.display import display
 
-        film = (_TO_FILM, _FROM_FILM) if kind == "filmic" else (_NO_FILM, _NO_FILM)
-        display(flat, gain, *film, table, made)
+        bend = (TO_FILM, FROM_FILM) if kind == "filmic" else (_NO_FILM, _NO_FILM)
+        display(flat, gain, *bend, table, made)
         return made.reshape(linear.shape)
     for start in range(0, len(flat), _BLOCK):
         light = flat[start : start + _BLOCK] * gain
         if kind == "filmic":
-            light = _film(light)
+            light = film(light)
         # fmax and fmin drop NaN; the cast rounds
         np.fmin(np.fmax(light, np.float32(0), out=light), np.float32(1), out=light)
         light *= np.float32(_STEPS - 1)
@@ -69,12 +69,17 @@ def tonemap16(
     flat = np.ascontiguousarray(linear, np.float32).reshape(-1, 3)
     made = np.empty(flat.shape, np.uint16)
     for start in range(0, len(flat), _BLOCK):
-        light = flat[start : start + _BLOCK] * np.float32(2.0**exposure)
-        if kind == "filmic":
-            light = _film(light)
-        np.fmin(np.fmax(light, np.float32(0), out=light), np.float32(1), out=light)
-        made[start : start + _BLOCK] = np.rint(65535 * _curve(light, kind == "raw"))
+        made[start : start + _BLOCK] = np.rint(65535 * shown(flat[start : start + _BLOCK], exposure, kind))
     return made.reshape(linear.shape)
+
+
+def shown(linear: npt.NDArray[np.float32], exposure: float, kind: str) -> npt.NDArray[Any]:
+    """(N, 3) what a display is sent, 0 … 1, of light (N, 3) in one of the `KINDS`."""
+    light = linear * np.float32(2.0**exposure)
+    if kind == "filmic":
+        light = film(light)
+    np.fmin(np.fmax(light, np.float32(0), out=light), np.float32(1), out=light)
+    return _curve(light, kind == "raw")
 
 
 def prepare() -> None:
@@ -82,14 +87,14 @@ def prepare() -> None:
     tonemap(np.zeros((1, THUMBNAIL + 1, 3), np.float32))
 
 
-def _film(light: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:
-    """Hill's fit, (N, 3) linear Rec.709 to display-linear Rec.709."""
+def film(light: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:
+    """Hill's fit, (N, 3) linear Rec.709 to display-linear Rec.709, below 0 and above 1 too."""
     clipped = np.fmin(np.fmax(light, np.float32(0)), np.float32(1e6))
-    x = clipped @ _TO_FILM.T
+    x = clipped @ TO_FILM.T
     bent = (x * (x + np.float32(0.0245786)) - np.float32(0.000090537)) / (
         x * (np.float32(0.983729) * x + np.float32(0.4329510)) + np.float32(0.238081)
     )
-    return np.asarray(bent @ _FROM_FILM.T, np.float32)
+    return np.asarray(bent @ FROM_FILM.T, np.float32)
 
 
 @cache
