@@ -1,0 +1,252 @@
+"""From a painted picture to a stroke: which places of which objects want which light.
+
+The mask is cut into cells of about equal size, at most as many as marks are allowed, in rows that are shifted
+by half a cell (so no line of a pattern meets all of them); where a cell shows several objects, slots, or
+parts that turn away from each other or lie behind each other, each is a mark of its own. Its light is the
+mean over its pixels: noise averages out, and no pixel is lost.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from studio_core.kernels.camera import sample_directions
+from studio_core.scene.nodes import NodeId, Scene, new_id
+from studio_core.scene.transform import rotation_matrix
+from studio_core.shading.artifacts import Hits, Picture, Surfaces
+from studio_core.shading.primary import eye_in, pinhole
+from studio_core.shading.surface_points import some_hits, surface_points
+from studio_core.strokes.marks import Marks
+from studio_core.strokes.stroke import Stroke
+
+F32 = npt.NDArray[np.float32]
+F64 = npt.NDArray[np.float64]
+I64 = npt.NDArray[np.int64]
+
+LIMIT = 600
+LOOKED_THROUGH = 0.5
+"""Of opacity: what lets more light through has no marks."""
+ALIKE = 0.8
+"""Cosine between normals that one mark may stand for."""
+PASSES = 4
+GROWTH = 1.12
+SAME = 1e-4
+"""Relative: light that differs less is the same."""
+NOTHING_KNOWN = "The picture does not tell which surfaces it shows, so nothing could be painted on."
+NOTHING_SEEN = "The stroke meets no surface that has a material: only the background was painted."
+
+
+@dataclass(frozen=True, eq=False)
+class Marked:
+    """Marks on `objects`; whether one light was painted over everything; in sentences what was left out."""
+
+    objects: tuple[NodeId, ...]
+    marks: Marks
+    flat: bool = False
+    notes: tuple[str, ...] = ()
+
+
+def marks_of(picture: Picture, mask: F32, wanted: F32, limit: int = LIMIT) -> Marked:
+    """At most `limit` marks of a mask (H, W) over a picture, and of the light wanted there (H, W, 3).
+
+    Pixels count that show one surface with a material alone, and whose light is finite. A stroke on the
+    background has none, and says so. ValueError where the mask does not fit the picture.
+    """
+    if mask.shape != picture.linear.shape[:2] or wanted.shape != picture.linear.shape:
+        raise ValueError("mask, wanted light and picture have different sizes")
+    hits, surfaces = picture.radiance.hits, picture.radiance.surfaces
+    if hits is None:
+        return Marked((), _no_marks(), notes=(NOTHING_KNOWN,))
+    pixel = np.flatnonzero(mask.reshape(-1) > 0)
+    pixel, sample, group = _of_one_surface(pixel, hits, surfaces)
+    shown, wish = picture.linear.reshape(-1, 3)[pixel], wanted.reshape(-1, 3)[pixel]
+    good = np.isfinite(shown).all(axis=1) & np.isfinite(wish).all(axis=1)
+    pixel, sample, group = pixel[good], sample[good], group[good]
+    if not len(pixel):
+        return Marked((), _no_marks(), notes=(NOTHING_SEEN,))
+    share = mask.reshape(-1)[pixel].astype(np.float64)
+    label, chosen = _Cells(hits, surfaces, pixel, sample, group, share).of(limit)
+    kept = label >= 0
+    shown, wish, share, label = shown[good][kept], wish[good][kept], share[kept], label[kept]
+    total = np.bincount(label, share)
+
+    def mean(light: F32) -> F32:
+        sums = [np.bincount(label, share * light[:, channel]) for channel in range(3)]
+        return np.asarray(np.stack(sums, axis=1) / total[:, None], np.float32)
+
+    weight = np.minimum(total / np.bincount(label).max(), 1).astype(np.float32)
+    objects, placed = _placed(hits, surfaces, sample[chosen])
+    marks = Marks(**placed, shown=mean(shown), wanted=mean(wish), weight=weight, offset=_unknown(len(chosen)))
+    return Marked(objects, marks, not _same(shown) and _same(wish))
+
+
+def stroke_of(marked: Marked, scene: Scene, tool: str, **fields: Any) -> Stroke:
+    """The stroke that says so, with a new id, and without `name` in the fields a name of its own."""
+    given = {"name": stroke_name(scene, tool, marked.objects), "flat": marked.flat, **fields}
+    table = marked.marks.table() if len(marked.marks) else None
+    return Stroke(id=new_id("stroke"), tool=tool, objects=marked.objects, table=table, **given)
+
+
+def stroke_name(scene: Scene, tool: str, objects: tuple[NodeId, ...]) -> str:
+    """`Replace on Seat`, or `Replace on Seat and 2 others`."""
+    names = [scene.nodes[node].name for node in objects if node in scene.nodes]
+    if not names:
+        return tool.capitalize()
+    others = f" and {len(names) - 1} other{'s' if len(names) > 2 else ''}" if len(names) > 1 else ""
+    return f"{tool.capitalize()} on {names[0]}{others}"
+
+
+def _of_one_surface(pixel: I64, hits: Hits, surfaces: Surfaces) -> tuple[I64, I64, I64]:
+    """Of pixels those that show one surface alone, their middle samples, and numbers of object and slot."""
+    mesh, count = surfaces.mesh, hits.samples**2
+    middle = hits.samples // 2 * (hits.samples + 1)
+    faces = hits.face.reshape(-1, count)[pixel]
+    hit = (faces >= 0).all(axis=1)
+    pixel, faces = pixel[hit], faces[hit]
+    slots = [placed.mesh.slots.astype(np.int64) for placed in mesh.objects]
+    slot = np.concatenate(slots) if slots else np.zeros(0, np.int64)
+    several = int(slot.max(initial=0)) + 1
+    owner = np.repeat(np.arange(len(slots)), np.diff(mesh.face_offsets))
+    group = (owner * several + slot)[faces]
+    material = mesh.face_material[faces[:, middle]]
+    solid = (surfaces.opacity >= LOOKED_THROUGH) & ~surfaces.catches
+    solid = np.append(solid, False)[material]  # −1: no material
+    own = (group == group[:, :1]).all(axis=1) & solid
+    return pixel[own], pixel[own] * count + middle, group[own, middle]
+
+
+class _Cells:
+    """Pixels (P,) of the picture, their samples, numbers of object and slot, and how much they count."""
+
+    def __init__(
+        self, hits: Hits, surfaces: Surfaces, pixel: I64, sample: I64, group: I64, share: F64
+    ) -> None:
+        view = hits.view
+        self._x, self._y = pixel % view.width, pixel // view.width
+        self._across = max(view.width, view.height)
+        self._group, self._share = group, share
+        way = np.empty((len(sample), 3), np.float32)
+        sample_directions(pinhole(view), sample, way)
+        self._distance = hits.distance[sample]
+        self._place = way * self._distance[:, None]  # from the eye
+        self._normal = _face_normals(surfaces, hits, sample)
+        self._angle = 2 * math.tan(math.radians(view.fov) / 2) / view.rows
+
+    def of(self, limit: int) -> tuple[I64, I64]:
+        """Which mark each pixel belongs to (P,), and the pixel that each mark stands at (M,), M ≤ limit.
+
+        Where even the coarsest cells are more, pixels of the smallest have none: −1.
+        """
+        size = max(1.0, math.sqrt(len(self._x) / limit))
+        while True:
+            label, chosen = self._cut(size)
+            if len(chosen) <= limit:
+                return label, chosen
+            if size > self._across:
+                kept = np.argsort(-np.bincount(label, self._share), kind="stable")[:limit]
+                number = np.full(len(chosen), -1)
+                number[kept] = np.arange(len(kept))
+                return number[label], chosen[kept]
+            size *= GROWTH
+
+    def _cut(self, size: float) -> tuple[I64, I64]:
+        """Marks of cells of `size` pixels."""
+        row = (self._y / size).astype(np.int64)
+        column = (self._x / size + 0.5 * (row % 2)).astype(np.int64)
+        wide = int(column.max()) + 1
+        cell = (self._group * (int(row.max()) + 1) + row) * wide + column
+        label, chosen = np.full(len(cell), -1, np.int64), [np.zeros(0, np.int64)]
+        left, made = np.arange(len(cell)), 0
+        for turn in range(PASSES):
+            _, number = np.unique(cell[left], return_inverse=True)
+            first = self._middles(left, number)
+            stands = first[number]
+            close = np.ones(len(left), np.bool_)
+            if turn < PASSES - 1:
+                close = self._close(left, stands, size)
+            label[left[close]] = made + number[close]
+            chosen.append(first)
+            made += len(first)
+            left = left[~close]
+            if not len(left):
+                break
+        return label, np.concatenate(chosen)
+
+    def _middles(self, some: I64, number: I64) -> I64:
+        """The pixel of each cell that is nearest to its mean."""
+        share, x, y = self._share[some], self._x[some], self._y[some]
+        total = np.bincount(number, share)
+        far_x = x - (np.bincount(number, share * x) / total)[number]
+        far_y = y - (np.bincount(number, share * y) / total)[number]
+        order = np.lexsort((far_x**2 + far_y**2, number))
+        starts = np.flatnonzero(np.diff(number[order], prepend=-1))
+        return np.asarray(some[order[starts]], np.int64)
+
+    def _close(self, some: I64, stands: I64, size: float) -> npt.NDArray[np.bool_]:
+        """Whether pixels lie on the same part of a surface as those that stand for them."""
+        normal = self._normal[stands]
+        alike = (self._normal[some] * normal).sum(axis=1) > ALIKE
+        height = np.abs(((self._place[some] - self._place[stands]) * normal).sum(axis=1))
+        return np.asarray(alike & (height <= size * self._angle * self._distance[stands]) | (some == stands))
+
+
+def _face_normals(surfaces: Surfaces, hits: Hits, sample: I64) -> F32:
+    """(P, 3) unit normals of faces that samples meet, towards the eye."""
+    mesh = surfaces.mesh
+    faces, which = np.unique(hits.face[sample], return_inverse=True)
+    corners = mesh.positions[mesh.faces[faces]].astype(np.float64)
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    behind = ((eye_in(surfaces, hits.view) - corners[:, 0]) * normals).sum(axis=1) < 0
+    normals[behind] *= -1
+    length = np.linalg.norm(normals, axis=1, keepdims=True)
+    return np.asarray((normals / np.maximum(length, 1e-30))[which], np.float32)
+
+
+def _placed(hits: Hits, surfaces: Surfaces, sample: I64) -> tuple[tuple[NodeId, ...], dict[str, Any]]:
+    """Objects, and of marks at samples (M,) their object, place, normal and slot, and the eye."""
+    mesh = surfaces.mesh
+    eye = np.asarray(hits.view.transform.translation, np.float64)
+    points = surface_points(surfaces, some_hits(hits, sample), eye)
+    face = hits.face[sample].astype(np.int64)
+    owner = np.searchsorted(mesh.face_offsets, face, side="right") - 1
+    known, number = np.unique(owner, return_inverse=True)
+    place = points.positions.astype(np.float64) + points.origin
+    normal = points.normals.astype(np.float64)
+    slot = np.zeros(len(face), np.int64)
+    for one in known.tolist():
+        own, placed = owner == one, mesh.objects[one]
+        turn, to = rotation_matrix(placed.transform.rotation), placed.transform
+        place[own] = (place[own] - to.translation) @ turn / to.scale
+        normal[own] = normal[own] @ turn
+        slot[own] = placed.mesh.slots[face[own] - mesh.face_offsets[one]]
+    told = {
+        "object": number.astype(np.int64),
+        "place": place.astype(np.float32),
+        "normal": normal.astype(np.float32),
+        "slot": slot,
+        "eye": np.tile(eye.astype(np.float32), (len(face), 1)),
+    }
+    return tuple(mesh.objects[one].node for one in known.tolist()), told
+
+
+def _same(light: F32) -> bool:
+    """Whether light (P, 3) is the same everywhere."""
+    low, high = light.min(axis=0), light.max(axis=0)
+    return bool((high - low <= SAME * max(float(np.abs(light).max()), 1e-30)).all())
+
+
+def _unknown(count: int) -> F32:
+    return np.full((count, 3), np.nan, np.float32)
+
+
+def _no_marks() -> Marks:
+    none, three = np.zeros(0, np.int64), np.zeros((0, 3), np.float32)
+    return Marks(none, three, three, none, three, three, three, np.zeros(0, np.float32), three)
+
+
+__all__ = ["LIMIT", "Marked", "marks_of", "stroke_name", "stroke_of"]
