@@ -21,6 +21,7 @@ from studio_core.scene.transform import rotation_matrix
 from studio_core.shading.artifacts import Hits, Picture, Surfaces
 from studio_core.shading.primary import eye_in, pinhole
 from studio_core.shading.surface_points import some_hits, surface_points
+from studio_core.strokes.cells import Pixels, cells_of
 from studio_core.strokes.marks import Marks
 from studio_core.strokes.stroke import Stroke
 
@@ -31,10 +32,6 @@ I64 = npt.NDArray[np.int64]
 LIMIT = 600
 LOOKED_THROUGH = 0.5
 """Of opacity: what lets more light through has no marks."""
-ALIKE = 0.8
-"""Cosine between normals that one mark may stand for."""
-PASSES = 4
-GROWTH = 1.12
 SAME = 1e-4
 """Relative: light that differs less is the same."""
 NOTHING_KNOWN = "The picture does not tell which surfaces it shows, so nothing could be painted on."
@@ -70,7 +67,7 @@ def marks_of(picture: Picture, mask: F32, wanted: F32, limit: int = LIMIT) -> Ma
     if not len(pixel):
         return Marked((), _no_marks(), notes=(NOTHING_SEEN,))
     share = mask.reshape(-1)[pixel].astype(np.float64)
-    label, chosen = _Cells(hits, surfaces, pixel, sample, group, share).of(limit)
+    label, chosen = cells_of(_pixels(hits, surfaces, pixel, sample, group, share), limit)
     kept = label >= 0
     shown, wish, share, label = shown[good][kept], wish[good][kept], share[kept], label[kept]
     total = np.bincount(label, share)
@@ -120,79 +117,17 @@ def _of_one_surface(pixel: I64, hits: Hits, surfaces: Surfaces) -> tuple[I64, I6
     return pixel[own], pixel[own] * count + middle, group[own, middle]
 
 
-class _Cells:
-    """Pixels (P,) of the picture, their samples, numbers of object and slot, and how much they count."""
-
-    def __init__(
-        self, hits: Hits, surfaces: Surfaces, pixel: I64, sample: I64, group: I64, share: F64
-    ) -> None:
-        view = hits.view
-        self._x, self._y = pixel % view.width, pixel // view.width
-        self._across = max(view.width, view.height)
-        self._group, self._share = group, share
-        way = np.empty((len(sample), 3), np.float32)
-        sample_directions(pinhole(view), sample, way)
-        self._distance = hits.distance[sample]
-        self._place = way * self._distance[:, None]  # from the eye
-        self._normal = _face_normals(surfaces, hits, sample)
-        self._angle = 2 * math.tan(math.radians(view.fov) / 2) / view.rows
-
-    def of(self, limit: int) -> tuple[I64, I64]:
-        """Which mark each pixel belongs to (P,), and the pixel that each mark stands at (M,), M ≤ limit.
-
-        Where even the coarsest cells are more, pixels of the smallest have none: −1.
-        """
-        size = max(1.0, math.sqrt(len(self._x) / limit))
-        while True:
-            label, chosen = self._cut(size)
-            if len(chosen) <= limit:
-                return label, chosen
-            if size > self._across:
-                kept = np.argsort(-np.bincount(label, self._share), kind="stable")[:limit]
-                number = np.full(len(chosen), -1)
-                number[kept] = np.arange(len(kept))
-                return number[label], chosen[kept]
-            size *= GROWTH
-
-    def _cut(self, size: float) -> tuple[I64, I64]:
-        """Marks of cells of `size` pixels."""
-        row = (self._y / size).astype(np.int64)
-        column = (self._x / size + 0.5 * (row % 2)).astype(np.int64)
-        wide = int(column.max()) + 1
-        cell = (self._group * (int(row.max()) + 1) + row) * wide + column
-        label, chosen = np.full(len(cell), -1, np.int64), [np.zeros(0, np.int64)]
-        left, made = np.arange(len(cell)), 0
-        for turn in range(PASSES):
-            _, number = np.unique(cell[left], return_inverse=True)
-            first = self._middles(left, number)
-            stands = first[number]
-            close = np.ones(len(left), np.bool_)
-            if turn < PASSES - 1:
-                close = self._close(left, stands, size)
-            label[left[close]] = made + number[close]
-            chosen.append(first)
-            made += len(first)
-            left = left[~close]
-            if not len(left):
-                break
-        return label, np.concatenate(chosen)
-
-    def _middles(self, some: I64, number: I64) -> I64:
-        """The pixel of each cell that is nearest to its mean."""
-        share, x, y = self._share[some], self._x[some], self._y[some]
-        total = np.bincount(number, share)
-        far_x = x - (np.bincount(number, share * x) / total)[number]
-        far_y = y - (np.bincount(number, share * y) / total)[number]
-        order = np.lexsort((far_x**2 + far_y**2, number))
-        starts = np.flatnonzero(np.diff(number[order], prepend=-1))
-        return np.asarray(some[order[starts]], np.int64)
-
-    def _close(self, some: I64, stands: I64, size: float) -> npt.NDArray[np.bool_]:
-        """Whether pixels lie on the same part of a surface as those that stand for them."""
-        normal = self._normal[stands]
-        alike = (self._normal[some] * normal).sum(axis=1) > ALIKE
-        height = np.abs(((self._place[some] - self._place[stands]) * normal).sum(axis=1))
-        return np.asarray(alike & (height <= size * self._angle * self._distance[stands]) | (some == stands))
+def _pixels(hits: Hits, surfaces: Surfaces, pixel: I64, sample: I64, group: I64, share: F64) -> Pixels:
+    """Pixels (P,) as cells are cut from them."""
+    view = hits.view
+    way = np.empty((len(sample), 3), np.float32)
+    sample_directions(pinhole(view), sample, way)
+    distance = hits.distance[sample]
+    angle = np.float32(2 * math.tan(math.radians(view.fov) / 2) / view.rows)
+    number = np.unique(group, return_inverse=True)[1].astype(np.int64)
+    x, y = pixel % view.width, pixel // view.width
+    normal = _face_normals(surfaces, hits, sample)
+    return Pixels(x, y, number, share, way * distance[:, None], normal, angle * distance)
 
 
 def _face_normals(surfaces: Surfaces, hits: Hits, sample: I64) -> F32:

@@ -106,14 +106,11 @@ def wanted(tool: str, seen: Seen, gesture: Gesture, settings: ToolSettings, mask
         raise ValueError(f"there is no tool {tool!r}; known: {', '.join(TOOLS)}")
     mask = gesture.mask(seen) if mask is None else mask
     out = seen.light.copy()
-    rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
-    if not len(rows) or tool == FIXATE:
+    if not mask.any() or tool == FIXATE:
         return out
-    margin = _margin(tool, settings, len(mask))
-    top, left = max(rows[0] - margin, 0), max(columns[0] - margin, 0)
-    part = (slice(top, rows[-1] + 1 + margin), slice(left, columns[-1] + 1 + margin))
+    part = _box(mask > 0, _margin(tool, settings, len(mask)))
     own = Seen(seen.light[part], seen.surface[part])
-    task = _Task(own, mask[part], (int(top), int(left)), seen, gesture, settings)
+    task = _Task(own, mask[part], (part[0].start, part[1].start), seen, gesture, settings)
     made = _TOOLS[tool](task)
     under = task.mask > 0
     light = own.light[under]
@@ -125,6 +122,13 @@ def laid_over(light: F32, wish: F32, mask: F32) -> F32:
     """(H, W, 3) how a picture looks with what is wanted on it, faded by the mask (H, W)."""
     told = np.where(np.isfinite(wish), wish, light)
     return np.asarray(light + mask[..., None] * (told - light), np.float32)
+
+
+def _box(marked: Bools, margin: int) -> tuple[slice, slice]:
+    """Rows and columns around what is marked (H, W), of which there is some."""
+    rows, columns = np.flatnonzero(marked.any(axis=1)), np.flatnonzero(marked.any(axis=0))
+    down, across = (slice(max(int(one[0]) - margin, 0), int(one[-1]) + 1 + margin) for one in (rows, columns))
+    return down, across
 
 
 def _margin(tool: str, settings: ToolSettings, height: int) -> int:
@@ -159,14 +163,16 @@ def _blur(task: _Task) -> F32:
     sigma = task.settings.radius * task.height
     made = light.copy()
     finite = np.isfinite(light).all(axis=2)
+    margin = math.ceil(REACH * sigma)
     for one in np.unique(surface[task.mask > 0]).tolist() if sigma > 0 else []:
-        own = (surface == one) & finite
+        part = _box((surface == one) & (task.mask > 0), margin)
+        own, level = ((surface == one) & finite)[part], light[part]
         share = gaussian_filter(own.astype(np.float32), sigma, mode="constant", truncate=REACH)
         inside = own & (share > 0)
         for channel in range(3):
-            level = np.where(own, light[..., channel], 0)
-            spread = gaussian_filter(level, sigma, mode="constant", truncate=REACH)
-            made[inside, channel] = spread[inside] / share[inside]
+            lit = np.where(own, level[..., channel], 0)
+            spread = gaussian_filter(lit, sigma, mode="constant", truncate=REACH)
+            made[part][inside, channel] = spread[inside] / share[inside]
     return made
 
 
