@@ -123,7 +123,8 @@ class SpecularGloss(Rough, Functions):
 
 def grazing(f0: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:
     """(..., 1) F90 of F0 (..., 3)."""
-    return np.minimum(GRAZING * f0.max(axis=-1, keepdims=True), np.float32(1))
+    made: npt.NDArray[np.float32] = np.minimum(GRAZING * f0.max(axis=-1, keepdims=True), np.float32(1))
+    return made
 
 
 MODEL = SpecularGloss()

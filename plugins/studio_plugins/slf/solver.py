@@ -225,8 +225,8 @@ def _samples(
         wanted = shown
     coefficients = dressed.coefficients(now.diffuse, now.specular)
     before = np.einsum("ntc,tc->nc", sums[-1], coefficients)
-    known = np.isfinite(marks.offset).all(axis=1)
-    offset = np.where(known[:, None], marks.offset, shown - before)
+    known = np.isfinite(marks.offset).all(axis=1, keepdims=True)
+    offset = np.where(known, marks.offset, shown - before)
     weight = marks.weight.astype(np.float64) * stroke.weight
     return Samples(wanted - offset, before, sums[:-1], sums[-1], weight), offset
 
@@ -238,7 +238,7 @@ def _pooled(parts: Sequence[tuple[Stroke, Samples, Places]]) -> Samples:
         one = samples
         if stroke.flat and stroke.tool != FIXATE and stroke.marks is not None:
             marks = stroke.marks.some(places.mark)
-            painted = np.asarray(marks.wanted != marks.shown, np.bool_).any(axis=1)
+            painted = np.not_equal(marks.wanted, marks.shown).any(axis=1)
             one = samples.some(np.flatnonzero(painted)).mean() + samples.some(np.flatnonzero(~painted))
         made = one if made is None else made + one
     assert made is not None
