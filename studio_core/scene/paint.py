@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -17,12 +18,13 @@ import numpy.typing as npt
 from studio_core.arrays import frozen_map, readonly
 from studio_core.scene.geometry import Table
 
+if TYPE_CHECKING:
+    from studio_core.scene.between import Cloud, Weights
+
 F32 = npt.NDArray[np.float32]
 I64 = npt.NDArray[np.int64]
-NEAREST = 8
-"""Points between which is interpolated."""
-POINT = 7
-"""Numbers of a point: place, normal, slot."""
+POINT, LOOK = 7, 3
+"""Numbers of a point: place, normal, slot; and of its look."""
 
 
 @dataclass(frozen=True)
@@ -31,16 +33,20 @@ class Paint:
 
     points (1, 1, N, 7): place and unit normal in the object's own frame, and the slot of its material;
     changes by parameter (1, 1, N, C), C = 1 for numbers and 3 for colours. Parameters that a slot's model
-    does not have change nothing there. ValueError where shapes do not fit.
+    does not have change nothing there. looks (1, 1, N, 3), where they vary: how the slot's picture looked
+    there (`shading.looks`), so that changes stay on what looks alike. ValueError where shapes do not fit.
     """
 
     points: Table
     changes: Mapping[str, Table]
+    looks: Table | None = None
 
     def __post_init__(self) -> None:
         count = self.points.values.shape[2]
         if self.points.values.shape != (1, 1, count, POINT):
             raise ValueError("paint lies on points with a place, a normal and a slot")
+        if self.looks is not None and self.looks.values.shape != (1, 1, count, LOOK):
+            raise ValueError("the looks do not fit the points")
         for name, table in self.changes.items():
             shape = table.values.shape
             if shape[:3] != (1, 1, count) or shape[3] not in (1, 3):
@@ -52,14 +58,16 @@ class Paint:
         normals: npt.ArrayLike,
         slots: npt.ArrayLike,
         changes: Mapping[str, npt.ArrayLike],
+        looks: npt.ArrayLike | None = None,
     ) -> Paint:
-        """From arrays (N, 3), (N, 3), (N,), and by parameter (N,) or (N, 3)."""
+        """From arrays (N, 3), (N, 3), (N,), by parameter (N,) or (N, 3), and looks (N, 3)."""
         slot = np.asarray(slots, np.float32)[:, None]
         points = np.concatenate(
             [np.asarray(places, np.float32), np.asarray(normals, np.float32), slot], axis=1
         )
         made = {name: _table(np.asarray(change, np.float32)) for name, change in changes.items()}
-        return Paint(_table(points), frozen_map(made))
+        known = None if looks is None else _table(np.asarray(looks, np.float32))
+        return Paint(_table(points), frozen_map(made), known)
 
     @property
     def places(self) -> F32:
@@ -85,42 +93,33 @@ class Paint:
     def key(self) -> str:
         """Content hash."""
         parts = (f"{name}:{table.key}" for name, table in sorted(self.changes.items()))
-        return "-".join((self.points.key, *parts))
+        looks = () if self.looks is None else (self.looks.key,)
+        return "-".join((self.points.key, *looks, *parts))
 
-    def weights(self, places: npt.ArrayLike, normals: npt.ArrayLike, slots: npt.ArrayLike) -> Weights:
-        """How much each of the nearest points counts at places (P, 3) with normals (P, 3) and slots (P,)."""
-        from scipy.spatial import cKDTree  # heavy: whoever reads a scene shall not wait for it
+    @property
+    def cloud(self) -> Cloud:
+        """The points, between which is interpolated."""
+        from studio_core.scene.between import Cloud  # heavy: whoever reads a scene shall not wait for it
 
-        where, facing = np.asarray(places, np.float64), np.asarray(normals, np.float64)
+        looks = None if self.looks is None else self.looks.values[0, 0]
+        return Cloud(self.places, self.normals, self.slots, looks)
+
+    def weights(
+        self,
+        places: npt.ArrayLike,
+        normals: npt.ArrayLike,
+        slots: npt.ArrayLike,
+        looks: npt.ArrayLike | None = None,
+    ) -> Weights:
+        """How much each of the nearest points counts at places (P, 3) with normals (P, 3) and slots (P,).
+
+        With looks (P, 3), and if the points have them, what looks alike counts more.
+        """
+        from studio_core.scene.between import Cloud, weigh
+
+        known = None if looks is None else np.asarray(looks, np.float32)
         slot = np.asarray(slots, np.int64)
-        near = min(NEAREST, len(self.places))
-        which = np.zeros((len(where), near), np.int64)
-        share = np.zeros((len(where), near), np.float32)
-        for number in np.unique(slot).tolist():
-            own, points = np.flatnonzero(slot == number), np.flatnonzero(self.slots == number)
-            if not len(points):
-                continue
-            count = min(near, len(points))
-            found = cKDTree(self.places[points]).query(where[own], k=count)
-            distance, index = (one.reshape(len(own), count) for one in found)
-            reach = np.maximum(distance[:, -1:], 1e-9) * (1 + 1e-6)
-            alike = np.maximum((self.normals[points][index] * facing[own, None]).sum(axis=2), 0)
-            weight = np.maximum(1 - distance / reach, 1e-6) ** 2 * np.maximum(alike, 1e-3) ** 2
-            which[own, :count] = points[index]
-            share[own, :count] = weight / weight.sum(axis=1, keepdims=True)
-        return Weights(which, share)
-
-
-@dataclass(frozen=True, eq=False)
-class Weights:
-    """Of P places: the numbers of the nearest points (P, K), and their shares (P, K); all 0: no paint."""
-
-    which: I64
-    share: F32
-
-    def __call__(self, values: F32) -> F32:
-        """(P, C) between values (N, C) of points."""
-        return np.asarray(np.einsum("pk,pkc->pc", self.share, values[self.which]), np.float32)
+        return weigh(self.cloud, Cloud(np.asarray(places), np.asarray(normals), slot, known))
 
 
 def _table(values: F32) -> Table:
@@ -128,4 +127,4 @@ def _table(values: F32) -> Table:
     return Table(readonly(columns[None, None], np.float32, 1, 1, -1, -1))
 
 
-__all__ = ["NEAREST", "Paint", "Weights"]
+__all__ = ["Paint"]

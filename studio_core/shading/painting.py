@@ -6,6 +6,7 @@ vertices and interpolated like light, so pictures keep their detail under it.
 
 from __future__ import annotations
 
+import dataclasses
 import operator
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -16,10 +17,13 @@ import numpy.typing as npt
 
 from studio_core.contract import Registry
 from studio_core.params import ParamInfo, param_infos
+from studio_core.scene.between import Weights
+from studio_core.scene.geometry import Texture
 from studio_core.scene.nodes import Material, MaterialId, MeshObject, NodeId, Scene
-from studio_core.scene.paint import Paint, Weights
+from studio_core.scene.paint import Paint
 from studio_core.scene.shading_mesh import ShadingMesh
 from studio_core.scene.world_mesh import WorldMesh
+from studio_core.shading.looks import PictureLooks
 from studio_core.shading.materials import Resolved, linear_rgb, resolve, shape_textures
 
 F32 = npt.NDArray[np.float32]
@@ -38,24 +42,29 @@ def painted(value: npt.ArrayLike, change: npt.ArrayLike, info: ParamInfo) -> npt
 
 @dataclass(frozen=True, eq=False)
 class Coat:
-    """Paint of one object as its shading vertices have it: weights of the points."""
+    """Paint of one object as its shading vertices have it: weights of the points.
+
+    `pictures` are those that the slots show, if the paint follows their looks.
+    """
 
     paint: Paint
     mesh: ShadingMesh
     weights: Weights
+    pictures: tuple[Texture | None, ...] = ()
 
     def changes(self, some: I64) -> Changes:
         """At some of the object's vertices."""
-        share = Weights(self.weights.which[some], self.weights.share[some])
+        share = self.weights.some(some)
         made = {name: share(self.paint.change(name)) for name in self.paint.changes}
         return {name: values[:, 0] if values.shape[1] == 1 else values for name, values in made.items()}
 
 
 class Coats:
-    """The coats of a scene's painted objects, kept while paint and mesh stay; moves change none."""
+    """The coats of a scene's painted objects, kept while paint, mesh and pictures stay; moves change none."""
 
-    def __init__(self) -> None:
+    def __init__(self, registry: Registry) -> None:
         self._held: dict[NodeId, Coat] = {}
+        self._looks = PictureLooks(registry)
 
     def __call__(self, scene: Scene, mesh: WorldMesh) -> dict[int, Coat]:
         """By number of the object in the mesh."""
@@ -65,15 +74,44 @@ class Coats:
             node = scene.nodes.get(placed.node)
             if not isinstance(node, MeshObject) or node.paint is None or not node.paint.changes:
                 continue
+            pictures = self._looks.pictures(scene, node) if node.paint.looks is not None else ()
             coat = self._held.get(placed.node)
-            if coat is None or coat.mesh is not placed.mesh or coat.paint.points is not node.paint.points:
-                own = placed.mesh
-                coat = Coat(node.paint, own, node.paint.weights(own.positions, own.normals, own.slot))
+            if coat is None or not _lies_on(coat, node.paint, placed.mesh, pictures):
+                coat = self._coat(coat, node.paint, placed.mesh, pictures)
             elif coat.paint is not node.paint:
-                coat = Coat(node.paint, coat.mesh, coat.weights)
+                coat = dataclasses.replace(coat, paint=node.paint)
             made[number] = held[placed.node] = coat
         self._held = held
         return made
+
+    def _coat(
+        self, before: Coat | None, paint: Paint, mesh: ShadingMesh, pictures: tuple[Texture | None, ...]
+    ) -> Coat:
+        if any(pictures):
+            looks = self._looks.of_mesh(pictures, mesh)
+            weights = paint.weights(mesh.positions, mesh.normals, mesh.slot, looks)
+            return Coat(paint, mesh, weights, pictures)
+        # Vertices that the mesh had before it was refined, or has still now that it no longer is.
+        old = 0
+        if before is not None and not any(before.pictures) and before.paint.points is paint.points:
+            old = min(len(before.mesh), len(mesh))
+            pairs = zip(_own(before.mesh), _own(mesh), strict=True)
+            old = old if all(np.array_equal(a[:old], b[:old]) for a, b in pairs) else 0
+        weights = paint.weights(*(array[old:] for array in _own(mesh)))
+        if before is not None and old:
+            kept = before.weights.some(np.arange(old))
+            which = np.concatenate([kept.which, weights.which])
+            weights = Weights(which, np.concatenate([kept.share, weights.share]))
+        return Coat(paint, mesh, weights, pictures)
+
+
+def _own(mesh: ShadingMesh) -> tuple[npt.NDArray[Any], ...]:
+    return mesh.positions, mesh.normals, mesh.slot
+
+
+def _lies_on(coat: Coat, paint: Paint, mesh: ShadingMesh, pictures: tuple[Texture | None, ...]) -> bool:
+    same = coat.paint.points is paint.points and coat.paint.looks is paint.looks
+    return same and coat.mesh is mesh and coat.pictures == pictures
 
 
 class PaintTable:
@@ -81,7 +119,7 @@ class PaintTable:
 
     def __init__(self, registry: Registry) -> None:
         self._registry = registry
-        self._coats = Coats()
+        self._coats = Coats(registry)
         self._held: dict[NodeId, tuple[tuple[object, ...], F32]] = {}
         self._nothing = np.zeros((0, 0), np.float32)
         self._made: tuple[tuple[object, ...], F32] = ((), self._nothing)
@@ -97,7 +135,7 @@ class PaintTable:
             node, own = mesh.objects[number].node, mesh.vertices_of(number)
             number_of = mesh.material[own]
             looks = tuple(scene.material(materials[m]) for m in np.unique(number_of[number_of >= 0]))
-            key = (coat.paint, coat.mesh, width, *looks)
+            key = (coat, width, *looks)
             known = self._held.get(node)
             if known is None or not _same(known[0], key):
                 known = key, self._changes(scene, materials, coat, number_of, width)

@@ -30,6 +30,7 @@ from studio_core.shading.frame import Frame
 from studio_core.shading.interpolation import EdgeErrors, edge_errors, squares_saved
 from studio_core.shading.job import Job
 from studio_core.shading.materials import coefficients, resolve
+from studio_core.shading.painting import PaintTable
 from studio_core.shading.pipeline import Inputs
 from studio_core.shading.primary import PrimaryStage
 from studio_core.shading.surfaces import SurfaceStage
@@ -253,11 +254,12 @@ def _worst(errors: EdgeErrors, adaptive: Adaptive) -> I64:
 
 
 class VertexRadiance:
-    """Radiance (V, 3) of light sums with gains and their materials' mean coefficients, without textures."""
+    """Radiance (V, 3) of light sums with gains, materials' mean coefficients and paint, without textures."""
 
     def __init__(self, services: Services) -> None:
         self._registry = services.registry
         self._means: dict[MaterialId, tuple[Material, F32]] = {}
+        self._paint = PaintTable(services.registry)
 
     def __call__(self, scene: Scene, radiance: Radiance) -> F32:
         """Zeros where `radiance` is not valid."""
@@ -269,8 +271,13 @@ class VertexRadiance:
             table[index, : len(mean)] = mean
         known = np.flatnonzero(radiance.valid)
         terms = radiance.combined(lights)[known]
+        mesh = radiance.surfaces.mesh
+        shown = table[mesh.material[known]]
+        painted = self._paint(scene, materials, mesh, radiance.width)
+        if len(painted):
+            shown += painted[known].reshape(shown.shape)
         made = np.zeros((len(radiance.valid), 3), np.float32)
-        made[known] = (terms * table[radiance.surfaces.mesh.material[known]]).sum(axis=1)
+        made[known] = (terms * shown).sum(axis=1)
         return made
 
     def _mean(self, material: Material) -> F32:

@@ -24,12 +24,12 @@ from studio_core.contract import Registry
 from studio_core.params import Value, param_infos
 from studio_core.scene.geometry import Image, Texture
 from studio_core.scene.nodes import MaterialId, Scene
-from studio_core.scene.shading_mesh import NO_BACK
 from studio_core.scene.world_mesh import WorldMesh
 from studio_core.shading.artifacts import Shapes
 from studio_core.shading.materials import Resolved, finite_shape, first_channel, resolve, scalar, shapes
 from studio_core.shading.normal_maps import mean_slope
 from studio_core.shading.painting import Changes, Coat, Coats, painted, shape_changes
+from studio_core.shading.texels import picture_areas, trilinear
 
 F32 = npt.NDArray[np.float32]
 I32 = npt.NDArray[np.int32]
@@ -66,21 +66,8 @@ class Grey:
         return float(self.levels[0].min()), float(self.levels[0].max())
 
     def at(self, uvs: F32, area: F32) -> F32:
-        """(P,) means over squares about uvs (P, 2) that cover `area` (P,) of the picture, which repeats.
-
-        Bilinear on the two levels whose texels come next to the square, and linear between them.
-        """
-        height, width = self.levels[0].shape
-        texels = np.maximum(area.astype(np.float64) * height * width, 1.0)
-        place = np.minimum(0.5 * np.log2(texels), len(self.levels) - 1)
-        low = np.floor(place).astype(np.int64)
-        made = np.zeros(len(uvs), np.float32)
-        for level in np.unique(low).tolist():
-            own = np.flatnonzero(low == level)
-            finer = _bilinear(self.levels[level], uvs[own])
-            coarser = _bilinear(self.levels[min(level + 1, len(self.levels) - 1)], uvs[own])
-            made[own] = finer + (place[own] - level).astype(np.float32) * (coarser - finer)
-        return made
+        """(P,) means over squares about uvs (P, 2) that cover `area` (P,) of the picture, which repeats."""
+        return trilinear(self.levels, uvs, area)
 
 
 def _halved(level: F32) -> F32:
@@ -89,30 +76,6 @@ def _halved(level: F32) -> F32:
         return level
     even = level[: len(level) // 2 * 2]
     return np.asarray(np.float32(0.5) * (even[::2] + even[1::2]))
-
-
-def _bilinear(texels: F32, uvs: F32) -> F32:
-    height, width = texels.shape
-    x, y = uvs[:, 0].astype(np.float64) * width - 0.5, uvs[:, 1].astype(np.float64) * height - 0.5
-    x0, y0 = np.floor(x), np.floor(y)
-    fx, fy = x - x0, y - y0
-    i, j = x0.astype(np.int64), y0.astype(np.int64)
-    left, right, below, above = i % width, (i + 1) % width, j % height, (j + 1) % height
-    low = texels[below, left] * (1 - fx) + texels[below, right] * fx
-    high = texels[above, left] * (1 - fx) + texels[above, right] * fx
-    return np.asarray(low * (1 - fy) + high * fy, np.float32)
-
-
-def picture_areas(mesh: WorldMesh) -> F32:
-    """(V,) how much of the texture coordinates' plane belongs to each vertex: a third of its faces'."""
-    total = np.zeros(len(mesh))
-    seen = np.flatnonzero(mesh.back_faces[:, 0] != NO_BACK)
-    for faces in (mesh.faces, mesh.back_faces[seen]):
-        corners = mesh.uvs[faces].astype(np.float64)
-        one, other = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-        area = np.abs(one[:, 0] * other[:, 1] - one[:, 1] * other[:, 0]) / 6
-        total += np.bincount(faces.reshape(-1), np.repeat(area, 3), minlength=len(total))
-    return total.astype(np.float32)
 
 
 @dataclass(frozen=True, eq=False)
@@ -164,7 +127,7 @@ class ShapeTable:
         self._slopes: dict[str, float] = {}
         self._uvs: F32 | None = None
         self._areas: F32 = np.zeros(0, np.float32)
-        self._coats = Coats()
+        self._coats = Coats(registry)
         self._kept: dict[MaterialId, tuple[Mapping[str, Texture], I64, tuple[Coat, ...], Steps]] = {}
 
     def __call__(self, scene: Scene, materials: Sequence[MaterialId], mesh: WorldMesh) -> Shapes:
@@ -317,4 +280,4 @@ def _extended(base: Shapes, material: I32, found: Sequence[tuple[int, Resolved, 
     )
 
 
-__all__ = ["MOST", "Grey", "ShapeTable", "Steps", "picture_areas", "step_of", "stepped"]
+__all__ = ["MOST", "Grey", "ShapeTable", "Steps", "step_of", "stepped"]

@@ -16,11 +16,12 @@ import numpy.typing as npt
 
 from studio_core.contract import Services
 from studio_core.scene.geometry import Image
-from studio_core.scene.nodes import MeshObject, Scene
+from studio_core.scene.nodes import Material, MeshObject, Scene
 from studio_core.scene.world_mesh import WorldMesh
 from studio_core.shading.artifacts import Surfaces
 from studio_core.shading.materials import Resolved, resolve, scalar
-from studio_core.shading.varying import Grey, picture_areas
+from studio_core.shading.texels import picture_areas
+from studio_core.shading.varying import Grey
 from studio_core.transport.reflectance import VertexCoefficients
 
 F32 = npt.NDArray[np.float32]
@@ -39,20 +40,31 @@ class LookTable:
     """Makes `Looks`, keeping what pictures and materials that stay come to."""
 
     def __init__(self, services: Services) -> None:
-        self._services = services
+        self._registry = services.registry
         self._coefficients = VertexCoefficients(services)
         self._pictures: dict[str, Grey] = {}
+        self._made: tuple[F32, WorldMesh, tuple[Material, ...], Looks] | None = None
 
     def __call__(self, scene: Scene, surfaces: Surfaces) -> Looks:
-        """Of the vertices of `surfaces.mesh`."""
+        """Of the vertices of `surfaces.mesh`; the same object while nothing changes."""
         mesh = surfaces.mesh
         coefficients = self._coefficients(unpainted(scene), surfaces)
+        used = tuple(scene.material(name) for name in surfaces.materials)
+        if self._made is not None:
+            before, shape, known, looks = self._made
+            if before is coefficients and shape.material is mesh.material and known == used:
+                return looks
+        looks = self._looks(coefficients, used, mesh)
+        self._made = coefficients, mesh, used, looks
+        return looks
+
+    def _looks(self, coefficients: F32, materials: tuple[Material, ...], mesh: WorldMesh) -> Looks:
         values = np.zeros((len(mesh), 3 * coefficients.shape[1] + 1), np.float32)
         values[:, :-1] = np.cbrt(np.maximum(coefficients, 0)).reshape(len(mesh), -1)
         models: dict[str, int] = {}
         model = np.full(len(mesh), -1, np.int32)
-        for number, name in enumerate(surfaces.materials):
-            resolved = resolve(scene.material(name), self._services.registry)
+        for number, material in enumerate(materials):
+            resolved = resolve(material, self._registry)
             own = np.flatnonzero(mesh.material == number)
             model[own] = models.setdefault(resolved.brdf.id, len(models))
             values[own, -1] = self._roughness(resolved, mesh, own)

@@ -6,6 +6,7 @@ A part is one slot of one object. Looks of different reflectance models say noth
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,16 +14,17 @@ import numpy.typing as npt
 from scipy.spatial import cKDTree
 
 from studio_core.scene.nodes import NodeId
-from studio_core.scene.transform import rotation_matrix
+from studio_core.scene.transform import Transform, rotation_matrix
 from studio_core.scene.world_mesh import WorldMesh
 from studio_core.strokes.marks import Marks
 from studio_plugins.slf.looks import Looks
 
 F32 = npt.NDArray[np.float32]
+F64 = npt.NDArray[np.float64]
 I32 = npt.NDArray[np.int32]
 I64 = npt.NDArray[np.int64]
 SLOTS = 1 << 16
-NEAR = 8  # vertices among which a mark looks for its own
+NEAR = 8  # vertices among which a place looks for its own
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,11 +47,11 @@ class Spots:
         return Spots(*(getattr(self, field.name)[which] for field in dataclasses.fields(self)))
 
     @staticmethod
-    def of_mesh(mesh: WorldMesh, looks: Looks) -> Spots:
-        """All vertices, whose looks are given."""
+    def of_mesh(mesh: WorldMesh, looks: Looks, first: int = 0) -> Spots:
+        """All vertices, whose looks are given; `first` is the number of the first object."""
         slots = [placed.mesh.slot for placed in mesh.objects]
         slot = np.concatenate([*slots, np.zeros(0, np.uint16)]).astype(np.int64)
-        part = mesh.object.astype(np.int64) * SLOTS + slot
+        part = (mesh.object.astype(np.int64) + first) * SLOTS + slot
         return Spots(mesh.positions, mesh.normals, looks.values, part, looks.model)
 
     @staticmethod
@@ -58,37 +60,48 @@ class Spots:
         face alike. Marks on objects or slots that the mesh has not are left out.
         """
         number = {placed.node: index for index, placed in enumerate(mesh.objects)}
-        parts: list[Spots] = []
+        parts = []
         for counted, node in enumerate(objects):
-            if node not in number:
-                continue
-            index = number[node]
-            placed = mesh.objects[index].transform
-            turn = rotation_matrix(placed.rotation).T
-            shift = np.array(placed.translation) - mesh.origin
-            own = vertices.some(np.arange(mesh.vertex_offsets[index], mesh.vertex_offsets[index + 1]))
-            for slot in np.unique(marks.slot[marks.object == counted]).tolist():
-                here = marks.some((marks.object == counted) & (marks.slot == slot))
-                place = placed.scale * (here.place.astype(np.float64) @ turn) + shift
-                normal = here.normal.astype(np.float64) @ turn
-                part = own.some(own.part == index * SLOTS + slot)
-                if len(part):
-                    parts.append(_looking_as(part, place, normal))
-        if not parts:
-            return vertices.some(np.zeros(0, np.int64))
-        rows = [[getattr(part, field.name) for part in parts] for field in dataclasses.fields(Spots)]
-        return Spots(*(np.concatenate(row) for row in rows))
+            if node in number:
+                here = marks.some(marks.object == counted)
+                index = number[node]
+                own = vertices.some(np.arange(*mesh.vertex_offsets[index : index + 2]))
+                parts.append(on_object(own, mesh, index, here.place, here.normal, here.slot))
+        return joined(parts, vertices)
 
 
-def _looking_as(part: Spots, place: npt.NDArray[np.float64], normal: npt.NDArray[np.float64]) -> Spots:
-    """At places (N, 3), what the nearest of a part that faces alike is."""
-    near = min(NEAR, len(part))
-    distance, found = (one.reshape(len(place), near) for one in cKDTree(part.place).query(place, k=near))
-    away = (part.normal[found] * normal[:, None]).sum(axis=2) <= 0
-    best = np.argmin(np.where(away, np.inf, distance), axis=1)
-    own = found[np.arange(len(place)), best]
-    as_there = part.some(own)
-    return dataclasses.replace(as_there, place=place.astype(np.float32), normal=normal.astype(np.float32))
+def joined(parts: Sequence[Spots], like: Spots) -> Spots:
+    """One after the other; as wide as others where there are none."""
+    every = [like.some(np.zeros(0, np.int64)), *parts]
+    fields = [field.name for field in dataclasses.fields(Spots)]
+    return Spots(*(np.concatenate([getattr(part, name) for part in every]) for name in fields))
 
 
-__all__ = ["SLOTS", "Spots"]
+def on_object(vertices: Spots, mesh: WorldMesh, index: int, places: F32, normals: F32, slots: I64) -> Spots:
+    """Places (N, 3) in an object's own frame, that look as the nearest of its vertices do that face alike."""
+    turn, scale, shift = frame_of(mesh.objects[index].transform, mesh.origin)
+    place = (scale * (places.astype(np.float64) @ turn) + shift).astype(np.float32)
+    normal = (normals.astype(np.float64) @ turn).astype(np.float32)
+    parts = []
+    for slot in np.unique(slots).tolist():
+        own = vertices.some(vertices.part == index * SLOTS + slot)
+        here = np.flatnonzero(slots == slot)
+        if not len(own):
+            continue
+        near = min(NEAR, len(own))
+        distance, found = cKDTree(own.place).query(place[here], k=near)
+        distance, found = distance.reshape(len(here), near), found.reshape(len(here), near)
+        away = (own.normal[found] * normal[here, None]).sum(axis=2) <= 0
+        best = np.argmin(np.where(away, np.inf, distance), axis=1)
+        as_there = own.some(found[np.arange(len(here)), best])
+        parts.append(dataclasses.replace(as_there, place=place[here], normal=normal[here]))
+    return joined(parts, vertices)
+
+
+def frame_of(transform: Transform, origin: F64) -> tuple[F64, float, F64]:
+    """A (3, 3), scale and shift (3,): a row p of the object's frame is at scale · p @ A + shift."""
+    turn = rotation_matrix(transform.rotation).T
+    return turn, transform.scale, np.asarray(transform.translation) - origin
+
+
+__all__ = ["SLOTS", "Spots", "frame_of", "joined", "on_object"]

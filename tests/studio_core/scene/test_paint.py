@@ -7,7 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from studio_core.scene.paint import NEAREST, Paint
+from studio_core.scene.between import NEAREST
+from studio_core.scene.paint import Paint
 
 
 def plane(rng, count):

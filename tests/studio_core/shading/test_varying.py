@@ -25,7 +25,8 @@ from studio_core.shading.materials import finite_shape, resolve, same_shapes, sh
 from studio_core.shading.offline import backend_params, scene_view
 from studio_core.shading.pipeline import Pipeline
 from studio_core.shading.surface_points import surface_uvs
-from studio_core.shading.varying import MOST, Grey, ShapeTable, picture_areas, step_of, stepped
+from studio_core.shading.texels import picture_areas
+from studio_core.shading.varying import MOST, Grey, ShapeTable, step_of, stepped
 
 seeds = st.integers(0, 2**32 - 1)
 

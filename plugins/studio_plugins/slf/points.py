@@ -1,0 +1,151 @@
+"""Where paint needs points: a mesh refined for what varies over it, and the vertices that suffice."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from scipy.spatial import cKDTree
+
+from studio_core.scene.between import Cloud, weigh
+from studio_core.scene.shading_mesh import NO_BACK, ShadingMesh, refined
+
+F32 = npt.NDArray[np.float32]
+I64 = npt.NDArray[np.int64]
+Bools = npt.NDArray[np.bool_]
+
+WITHIN = 0.005
+"""What may be lost at vertices when points are left out, of values up to 1."""
+STEP = 0.1
+"""Edges between values that differ by more are cut."""
+ROUNDS = 12
+MOST = 20_000
+"""Vertices from which on a mesh is refined no further."""
+CELLS = 24
+"""Along an object: so far apart are points where nothing varies."""
+CHECKS = 4
+UNLIKE = 0.02
+"""Looks that are farther apart than this may have other changes; black and white are 1 apart."""
+
+
+@dataclass(frozen=True, eq=False)
+class Looking:
+    """Looks (V, 3) that paint of a mesh follows, or None; vertices are `clear` (V,) if they have one look."""
+
+    looks: F32 | None
+    clear: Bools
+
+
+def finer(
+    mesh: ShadingMesh,
+    wanted: Callable[[ShadingMesh], F32],
+    seeds: tuple[F32, F32],
+    shortest: float,
+    looking: Callable[[ShadingMesh], Looking],
+) -> tuple[ShadingMesh, F32]:
+    """The mesh with edges cut down to `shortest` where `wanted` (V, C) varies, and its values there.
+
+    seeds: places (N, 3) and values (N, C) that the vertices next to them are to have as well. Ends that look
+    different may have different values: paint follows looks by itself.
+    """
+    values = wanted(mesh)
+    for _ in range(ROUNDS):
+        room = MOST - len(mesh)
+        pairs = _pairs(mesh)
+        gap = _gap(values, looking(mesh), pairs)
+        length = np.linalg.norm(_across(mesh.positions, pairs), axis=1)
+        lonely = np.zeros(len(mesh), np.bool_)
+        if len(seeds[0]):
+            near = cKDTree(mesh.positions).query(seeds[0])[1]
+            lonely[near[np.abs(values[near] - seeds[1]).max(axis=1) > STEP]] = True
+        marked = np.flatnonzero(((gap > STEP) | lonely[pairs].any(axis=1)) & (length > shortest))
+        if not len(marked) or room <= 0:
+            break
+        if len(marked) > room:
+            marked = marked[np.argsort(-length[marked], kind="stable")[:room]]
+        mesh = refined(mesh, marked=pairs[marked])[0]
+        values = wanted(mesh)
+    return mesh, values
+
+
+def sufficient(mesh: ShadingMesh, values: F32, looking: Looking) -> I64:
+    """Vertices between which all others have their values (V, C), within WITHIN; none where all are 0.
+
+    In slots without any change there are no points; where it is the same all over, there is one. Those that
+    are not clear have no say.
+    """
+    clear = looking.clear
+    pairs, slots = _pairs(mesh), mesh.slot.astype(np.int64)
+    chosen = np.zeros(len(mesh), np.bool_)
+    chosen[pairs[_gap(values, looking, pairs) > WITHIN]] = True
+    chosen[pairs[chosen[pairs].any(axis=1)]] = True
+    chosen &= clear
+    open_slots = []
+    for slot in np.unique(slots[clear]).tolist():
+        own = np.flatnonzero((slots == slot) & clear)
+        if not np.abs(values[own]).max() > 0:
+            chosen[own] = False
+        elif float(np.ptp(values[own], axis=0).max()) <= WITHIN:
+            chosen[own] = False
+            chosen[own[0]] = True
+        else:
+            open_slots.append(slot)
+    rest = np.flatnonzero(np.isin(slots, open_slots) & clear)
+    if not len(rest):
+        return np.flatnonzero(chosen)
+    chosen[rest[_sparse(mesh, rest)]] = True
+    cloud = Cloud(mesh.positions, mesh.normals, slots, looking.looks)
+    for _ in range(CHECKS):
+        points = np.flatnonzero(chosen)
+        made = weigh(_some(cloud, points), _some(cloud, rest))(values[points])
+        off = np.abs(made - values[rest]).max(axis=1) > WITHIN
+        off &= ~chosen[rest]
+        if not off.any():
+            break
+        chosen[rest[off]] = True
+    return np.flatnonzero(chosen)
+
+
+def _some(cloud: Cloud, which: I64) -> Cloud:
+    looks = None if cloud.looks is None else cloud.looks[which]
+    return Cloud(cloud.places[which], cloud.normals[which], cloud.slots[which], looks)
+
+
+def _pairs(mesh: ShadingMesh) -> I64:
+    """(N, 2) vertices that share an edge on one side; edges between faces twice."""
+    back = mesh.back_faces[mesh.back_faces[:, 0] != NO_BACK]
+    faces = np.concatenate([mesh.faces, back]).astype(np.int64)
+    return np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
+
+
+def _across(values: F32, pairs: I64) -> F32:
+    return np.asarray(values[pairs[:, 0]] - values[pairs[:, 1]])
+
+
+def _gap(values: F32, looking: Looking, pairs: I64) -> F32:
+    """(N,) how much values differ of ends that look alike; 0 of others."""
+    made = np.abs(_across(values, pairs)).max(axis=1, initial=0)
+    if looking.looks is not None:
+        made[np.abs(_across(looking.looks, pairs)).max(axis=1) > UNLIKE] = 0
+        made[~looking.clear[pairs].all(axis=1)] = 0
+    return np.asarray(made)
+
+
+def _sparse(mesh: ShadingMesh, some: I64) -> I64:
+    """Which of some vertices are the first of their slot that face their way in a cell of a coarse grid."""
+    places = mesh.positions[some]
+    size = max(float(np.ptp(places, axis=0).max()) / CELLS, 1e-9)
+    cells = np.floor((places - places.min(axis=0)) / size).astype(np.int64)
+    facing = np.rint(mesh.normals[some]).astype(np.int64) + 1
+    key = cells[:, 0]
+    for part in (cells[:, 1], cells[:, 2]):
+        key = key * (CELLS + 2) + part
+    for part in (facing[:, 0], facing[:, 1], facing[:, 2]):
+        key = key * 3 + part
+    key = key * (int(mesh.slot.max()) + 1) + mesh.slot[some]
+    return np.asarray(np.unique(key, return_index=True)[1])
+
+
+__all__ = ["MOST", "STEP", "WITHIN", "Looking", "finer", "sufficient"]
