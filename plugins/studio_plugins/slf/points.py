@@ -31,55 +31,60 @@ UNLIKE = 0.02
 
 
 @dataclass(frozen=True, eq=False)
-class Looking:
-    """Looks (V, 3) that paint of a mesh follows, or None; vertices are `clear` (V,) if they have one look."""
+class Known:
+    """Of a mesh's vertices: values (V, C) that are wanted, and how they look.
 
+    looks (V, 3) are what paint follows, None if it follows none; vertices that stand for surface of one look
+    are `clear` (V,); original (V, K) are the looks by which values were found.
+    """
+
+    values: F32
     looks: F32 | None
     clear: Bools
+    original: F32
 
 
 def finer(
     mesh: ShadingMesh,
-    wanted: Callable[[ShadingMesh], F32],
+    known: Callable[[ShadingMesh], Known],
     seeds: tuple[F32, F32],
     shortest: float,
-    looking: Callable[[ShadingMesh], Looking],
-) -> tuple[ShadingMesh, F32]:
-    """The mesh with edges cut down to `shortest` where `wanted` (V, C) varies, and its values there.
+) -> tuple[ShadingMesh, Known]:
+    """The mesh with edges cut down to `shortest` where values vary, and what is known of it.
 
     seeds: places (N, 3) and values (N, C) that the vertices next to them are to have as well. Ends that look
     different may have different values: paint follows looks by itself.
     """
-    values = wanted(mesh)
+    here = known(mesh)
     for _ in range(ROUNDS):
         room = MOST - len(mesh)
         pairs = _pairs(mesh)
-        gap = _gap(values, looking(mesh), pairs)
+        gap = _gap(here, pairs)
         length = np.linalg.norm(_across(mesh.positions, pairs), axis=1)
         lonely = np.zeros(len(mesh), np.bool_)
         if len(seeds[0]):
             near = cKDTree(mesh.positions).query(seeds[0])[1]
-            lonely[near[np.abs(values[near] - seeds[1]).max(axis=1) > STEP]] = True
+            lonely[near[np.abs(here.values[near] - seeds[1]).max(axis=1) > STEP]] = True
         marked = np.flatnonzero(((gap > STEP) | lonely[pairs].any(axis=1)) & (length > shortest))
         if not len(marked) or room <= 0:
             break
         if len(marked) > room:
             marked = marked[np.argsort(-length[marked], kind="stable")[:room]]
         mesh = refined(mesh, marked=pairs[marked])[0]
-        values = wanted(mesh)
-    return mesh, values
+        here = known(mesh)
+    return mesh, here
 
 
-def sufficient(mesh: ShadingMesh, values: F32, looking: Looking) -> I64:
+def sufficient(mesh: ShadingMesh, here: Known) -> I64:
     """Vertices between which all others have their values (V, C), within WITHIN; none where all are 0.
 
     In slots without any change there are no points; where it is the same all over, there is one. Those that
     are not clear have no say.
     """
-    clear = looking.clear
+    values, clear = here.values, here.clear
     pairs, slots = _pairs(mesh), mesh.slot.astype(np.int64)
     chosen = np.zeros(len(mesh), np.bool_)
-    chosen[pairs[_gap(values, looking, pairs) > WITHIN]] = True
+    chosen[pairs[_gap(here, pairs) > WITHIN]] = True
     chosen[pairs[chosen[pairs].any(axis=1)]] = True
     chosen &= clear
     open_slots = []
@@ -96,7 +101,7 @@ def sufficient(mesh: ShadingMesh, values: F32, looking: Looking) -> I64:
     if not len(rest):
         return np.flatnonzero(chosen)
     chosen[rest[_sparse(mesh, rest)]] = True
-    cloud = Cloud(mesh.positions, mesh.normals, slots, looking.looks)
+    cloud = Cloud(mesh.positions, mesh.normals, slots, here.looks)
     for _ in range(CHECKS):
         points = np.flatnonzero(chosen)
         made = weigh(_some(cloud, points), _some(cloud, rest))(values[points])
@@ -124,12 +129,12 @@ def _across(values: F32, pairs: I64) -> F32:
     return np.asarray(values[pairs[:, 0]] - values[pairs[:, 1]])
 
 
-def _gap(values: F32, looking: Looking, pairs: I64) -> F32:
+def _gap(here: Known, pairs: I64) -> F32:
     """(N,) how much values differ of ends that look alike; 0 of others."""
-    made = np.abs(_across(values, pairs)).max(axis=1, initial=0)
-    if looking.looks is not None:
-        made[np.abs(_across(looking.looks, pairs)).max(axis=1) > UNLIKE] = 0
-        made[~looking.clear[pairs].all(axis=1)] = 0
+    made = np.abs(_across(here.values, pairs)).max(axis=1, initial=0)
+    if here.looks is not None:
+        made[np.abs(_across(here.original, pairs)).max(axis=1) > UNLIKE] = 0
+        made[~here.clear[pairs].all(axis=1)] = 0
     return np.asarray(made)
 
 
@@ -148,4 +153,4 @@ def _sparse(mesh: ShadingMesh, some: I64) -> I64:
     return np.asarray(np.unique(key, return_index=True)[1])
 
 
-__all__ = ["MOST", "STEP", "WITHIN", "Looking", "finer", "sufficient"]
+__all__ = ["MOST", "STEP", "WITHIN", "Known", "finer", "sufficient"]

@@ -14,7 +14,6 @@ import numpy as np
 import numpy.typing as npt
 
 from studio_core.contract import Services
-from studio_core.scene.between import Weights
 from studio_core.scene.geometry import Texture
 from studio_core.scene.nodes import MeshObject, NodeId, Scene
 from studio_core.scene.paint import Paint
@@ -24,10 +23,11 @@ from studio_core.shading.artifacts import Surfaces
 from studio_core.shading.looks import PictureLooks, looks_vary
 from studio_plugins.slf.field import Field
 from studio_plugins.slf.looks import LookTable
-from studio_plugins.slf.points import Looking, finer, sufficient
+from studio_plugins.slf.points import Known, finer, sufficient
 from studio_plugins.slf.spots import SLOTS, Spots, frame_of, joined, on_object
 
 F32 = npt.NDArray[np.float32]
+Bools = npt.NDArray[np.bool_]
 
 SHORTEST = 0.01
 """Metres in the world: edges that are shorter are not cut."""
@@ -110,7 +110,10 @@ class Spread:
         assert isinstance(node, MeshObject)
         pictures = self._pictures.pictures(scene, node)
 
-        def wanted(mesh: ShadingMesh) -> F32:
+        follows = field.by_look or (under is not None and under.looks is not None)
+        shown = pictures if follows else ()
+
+        def wanted(mesh: ShadingMesh) -> tuple[F32, Spots]:
             there = vertices
             if mesh is not placed.mesh:
                 one = Placed(placed.node, mesh, placed.transform, placed.materials)
@@ -121,41 +124,36 @@ class Spread:
             if under is not None:
                 looks = None if under.looks is None else self._pictures.of_mesh(pictures, mesh)
                 weights = under.weights(mesh.positions, mesh.normals, mesh.slot, looks)
-                made = made + columns.stack(_changes(under, weights), len(mesh))
-            return made
+                beneath = {name: weights(under.change(name)) for name in under.changes}
+                made = made + columns.stack(beneath, len(mesh))
+            return made, there
 
         seeds, told = self._seeds(field, columns, base, index, vertices, under)
         plain = wanted(placed.mesh)
-        scale = columns.scale(np.concatenate([plain, told]))
-        follows = field.by_look or (under is not None and under.looks is not None)
+        scale = columns.scale(np.concatenate([plain[0], told]))
 
-        def looking(mesh: ShadingMesh) -> Looking:
-            return self._looking(pictures if follows else (), mesh)
+        def known(mesh: ShadingMesh) -> Known:
+            values, there = plain if mesh is placed.mesh else wanted(mesh)
+            return Known(values / scale, *self._looking(shown, mesh), there.look)
 
-        mesh, values = finer(
-            placed.mesh,
-            lambda one: (plain if one is placed.mesh else wanted(one)) / scale,
-            (seeds, told / scale),
-            SHORTEST / placed.transform.scale,
-            looking,
-        )
-        shown = looking(mesh)
-        points = sufficient(mesh, values, shown)
+        shortest = SHORTEST / placed.transform.scale
+        mesh, here = finer(placed.mesh, known, (seeds, told / scale), shortest)
+        points = sufficient(mesh, here)
         if not len(points):
             return None
-        changes = columns.split(values[points] * scale)
-        own = None if shown.looks is None else shown.looks[points]
+        changes = columns.split(here.values[points] * scale)
+        own = None if here.looks is None else here.looks[points]
         return Paint.of(mesh.positions[points], mesh.normals[points], mesh.slot[points], changes, own)
 
-    def _looking(self, pictures: tuple[Texture | None, ...], mesh: ShadingMesh) -> Looking:
+    def _looking(self, pictures: tuple[Texture | None, ...], mesh: ShadingMesh) -> tuple[F32 | None, Bools]:
         """The looks of pictures, and whether no edge of one runs through what a vertex stands for."""
         clear = np.ones(len(mesh), np.bool_)
         looks = self._pictures.of_mesh(pictures, mesh) if any(pictures) else None
         if looks is None or not looks_vary(looks):
-            return Looking(None, clear)
+            return None, clear
         itself = self._pictures.of_mesh(pictures, mesh, sharp=True)
         clear = np.abs(looks - itself).max(axis=1) < MIXED
-        return Looking(looks, clear | bool(clear.mean() < LEAST_CLEAR))
+        return looks, clear | bool(clear.mean() < LEAST_CLEAR)
 
     def _seeds(
         self,
@@ -180,10 +178,6 @@ class Spread:
             )
         turn, scale, shift = frame_of(placed.transform, base.mesh.origin)
         return np.asarray((there.place - shift) @ turn.T / scale, np.float32), made
-
-
-def _changes(paint: Paint, weights: Weights) -> dict[str, F32]:
-    return {name: weights(paint.change(name)) for name in paint.changes}
 
 
 __all__ = ["SHORTEST", "Columns", "Spread"]
