@@ -124,6 +124,10 @@ class PaintTable:
         self._nothing = np.zeros((0, 0), np.float32)
         self._made: tuple[tuple[object, ...], F32] = ((), self._nothing)
 
+    def coats(self, scene: Scene, mesh: WorldMesh) -> Mapping[int, Coat]:
+        """By number of the painted object in the mesh."""
+        return self._coats(scene, mesh)
+
     def __call__(self, scene: Scene, materials: Sequence[MaterialId], mesh: WorldMesh, width: int) -> F32:
         """(V, width · 3) for vertices whose `material` counts in `materials`; (0, 0): nothing is painted.
 

@@ -30,6 +30,7 @@ from studio_core.shading.frame import Frame
 from studio_core.shading.interpolation import EdgeErrors, edge_errors, squares_saved
 from studio_core.shading.job import Job
 from studio_core.shading.materials import coefficients, resolve
+from studio_core.shading.paint_edges import with_paint
 from studio_core.shading.painting import PaintTable
 from studio_core.shading.pipeline import Inputs
 from studio_core.shading.primary import PrimaryStage
@@ -140,6 +141,7 @@ class AdaptiveSurfaceStage(SurfaceStage):
         job.checkpoint()
         whole = self._whole(frame.scene, made[Radiance], radiance)
         errors = edge_errors(surfaces.mesh, hits, shown, radiance.valid, whole)
+        errors = self._radiance.with_paint(errors, frame.scene, radiance, hits)
         job.checkpoint()
         saved = partial(squares_saved, surfaces.mesh, hits, shown, radiance.valid)
         proven = self._proven
@@ -279,6 +281,17 @@ class VertexRadiance:
         made = np.zeros((len(radiance.valid), 3), np.float32)
         made[known] = (terms * shown).sum(axis=1)
         return made
+
+    def with_paint(self, errors: EdgeErrors, scene: Scene, radiance: Radiance, hits: Hits) -> EdgeErrors:
+        """What edges miss, with paint between vertices."""
+        coats = self._paint.coats(scene, radiance.surfaces.mesh)
+        if not coats or not len(errors.ends):
+            return errors
+        surfaces = radiance.surfaces
+        painted = self._paint(scene, surfaces.materials, surfaces.mesh, radiance.width)
+        lights = {light.id: light for light in scene.of(Light) if scene.shown(light.id)}
+        terms = np.where(radiance.valid[:, None, None], radiance.combined(lights), 0)
+        return with_paint(errors, scene, surfaces, coats, painted, terms, hits, self._registry)
 
     def _mean(self, material: Material) -> F32:
         known = self._means.get(material.id)
