@@ -58,17 +58,25 @@ class LookTable:
         self._made = coefficients, mesh, used, looks
         return looks
 
+    def models(self, scene: Scene, surfaces: Surfaces) -> Looks:
+        """Where looks decide nothing: of no channel."""
+        mesh = surfaces.mesh
+        used = tuple(scene.material(name) for name in surfaces.materials)
+        return Looks(np.zeros((len(mesh), 0), np.float32), self._numbered(used)[mesh.material])
+
+    def _numbered(self, materials: tuple[Material, ...]) -> I32:
+        """(M + 1,) the number of each one's model; last −1."""
+        numbers: dict[str, int] = {}
+        known = [resolve(material, self._registry).brdf.id for material in materials]
+        return np.array([*(numbers.setdefault(name, len(numbers)) for name in known), -1], np.int32)
+
     def _looks(self, coefficients: F32, materials: tuple[Material, ...], mesh: WorldMesh) -> Looks:
         values = np.zeros((len(mesh), 3 * coefficients.shape[1] + 1), np.float32)
         values[:, :-1] = np.cbrt(np.maximum(coefficients, 0)).reshape(len(mesh), -1)
-        models: dict[str, int] = {}
-        model = np.full(len(mesh), -1, np.int32)
         for number, material in enumerate(materials):
-            resolved = resolve(material, self._registry)
             own = np.flatnonzero(mesh.material == number)
-            model[own] = models.setdefault(resolved.brdf.id, len(models))
-            values[own, -1] = self._roughness(resolved, mesh, own)
-        return Looks(values, model)
+            values[own, -1] = self._roughness(resolve(material, self._registry), mesh, own)
+        return Looks(values, self._numbered(materials)[mesh.material])
 
     def _roughness(self, resolved: Resolved, mesh: WorldMesh, own: npt.NDArray[np.int64]) -> F32 | float:
         """α of a material at its vertices; 0 where its model does not say which number that is."""

@@ -16,9 +16,11 @@ F32 = npt.NDArray[np.float32]
 I64 = npt.NDArray[np.int64]
 Bools = npt.NDArray[np.bool_]
 
-WITHIN = 0.005
+WITHIN = 0.008
 """What may be lost at vertices when points are left out, of values up to 1."""
-STEP = 0.1
+STEEP = 0.04
+"""Both ends of edges between values that differ by more are points."""
+STEP = 0.15
 """Edges between values that differ by more are cut."""
 ROUNDS = 12
 MOST = 20_000
@@ -84,7 +86,7 @@ def sufficient(mesh: ShadingMesh, here: Known) -> I64:
     values, clear = here.values, here.clear
     pairs, slots = _pairs(mesh), mesh.slot.astype(np.int64)
     chosen = np.zeros(len(mesh), np.bool_)
-    chosen[pairs[_gap(here, pairs) > WITHIN]] = True
+    chosen[pairs[_gap(here, pairs) > STEEP]] = True
     chosen[pairs[chosen[pairs].any(axis=1)]] = True
     chosen &= clear
     open_slots = []

@@ -118,7 +118,8 @@ class Spread:
             if mesh is not placed.mesh:
                 one = Placed(placed.node, mesh, placed.transform, placed.materials)
                 alone = assemble([one], base.mesh.origin)
-                own = self._finer(scene, dataclasses.replace(base, mesh=alone))
+                beside = dataclasses.replace(base, mesh=alone)
+                own = self._finer(scene, beside) if follows else self._finer.models(scene, beside)
                 there = Spots.of_mesh(alone, own, index)
             made = columns.stack(field.at(there, self._workers), len(mesh))
             if under is not None:
