@@ -192,7 +192,9 @@ def _set_paint(dice: Dice) -> Edit:
     count = dice.rng.randint(1, 5)
     rng = np.random.default_rng(dice.rng.randint(0, 99))
     changes = {"base_color": rng.normal(size=(count, 3)), "roughness": rng.normal(size=count)}
-    paint = Paint.of(rng.normal(size=(count, 3)), rng.normal(size=(count, 3)), np.zeros(count), changes)
+    looks = rng.random((count, 3)) if dice.rng.random() < 0.5 else None
+    shape = rng.normal(size=(count, 3)), rng.normal(size=(count, 3)), np.zeros(count)
+    paint = Paint.of(*shape, changes, looks)
     return edits.SetPaint(dice.node(), paint if dice.rng.random() < 0.8 else None)
 
 

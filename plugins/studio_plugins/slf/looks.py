@@ -1,9 +1,10 @@
 """How surface looks apart from its light: what likeness and upsampling compare.
 
 A look is the cube root of the coefficients of a vertex' material, pictures averaged over what it stands for,
-and its roughness. Cube roots are about as uniform as lightness is (CIE L*: 0 black, 1 white), and roughness α
-is so for gloss (Pellacini, Ferwerda & Greenberg 2000). What strokes changed before is left out: it is the
-original look that tells which surface belongs together (section 6.5).
+and its roughness. Cube roots are about as uniform as lightness is (CIE L*: 0 black, 1 white; first terms are
+matte and have 1 / π of it), and roughness α is so for gloss (Pellacini, Ferwerda & Greenberg 2000). What
+strokes changed before is left out: it is the original look that tells which surface belongs together (section
+6.5).
 """
 
 from __future__ import annotations
@@ -72,7 +73,9 @@ class LookTable:
 
     def _looks(self, coefficients: F32, materials: tuple[Material, ...], mesh: WorldMesh) -> Looks:
         values = np.zeros((len(mesh), 3 * coefficients.shape[1] + 1), np.float32)
-        values[:, :-1] = np.cbrt(np.maximum(coefficients, 0)).reshape(len(mesh), -1)
+        shares = np.cbrt(np.maximum(coefficients, 0))
+        shares[:, 0] *= np.float32(np.cbrt(np.pi))
+        values[:, :-1] = shares.reshape(len(mesh), -1)
         for number, material in enumerate(materials):
             own = np.flatnonzero(mesh.material == number)
             values[own, -1] = self._roughness(resolve(material, self._registry), mesh, own)

@@ -33,6 +33,7 @@ from studio_core.scene.nodes import (
     Scene,
     SpotLamp,
 )
+from studio_core.scene.paint import Paint
 from studio_core.scene.transform import Transform
 
 SLOW = settings(max_examples=60, deadline=None, suppress_health_check=list(HealthCheck))
@@ -123,6 +124,23 @@ def test_how_a_picture_lies_is_kept_and_older_files_lay_it_straight() -> None:
     inward = codec.Inward(lambda ref, part, squeezed: blobs.unpack(ref, iter(packed[ref.blob][1]), part))
     older = inward.item(written, "an item")
     assert older.textures["colour"].affine == (2.0, 0.0, 0.1, 0.0, 3.0, 0.2)
+
+
+def test_paint_keeps_its_looks_and_older_files_have_none() -> None:
+    points = [(0.0, 1.0, 2.0), (1.0, 0.0, 0.0)], [(0.0, 1.0, 0.0)] * 2, [0, 1]
+    looks = [(0.1, 0.2, 0.3), (0.4, 0.5, 0.6)]
+    coat = Paint.of(*points, {"roughness": [0.1, 0.2]}, looks)
+    (made,) = back(mesh(paint=coat))
+    assert made.paint.key == coat.key
+    text, blobs_ = codec.encode_item(mesh(paint=coat))
+    written = loads(text, "an item")
+    del written["paint"]["looks"]
+    packed = {
+        b.ref.blob: (b.ref, [bytes(p) for p in blobs.pack(b.array, b.ref, squeeze=b.squeeze)]) for b in blobs_
+    }
+    inward = codec.Inward(lambda ref, part, squeezed: blobs.unpack(ref, iter(packed[ref.blob][1]), part))
+    older = inward.item(written, "an item")
+    assert older.paint.key == Paint.of(*points, {"roughness": [0.1, 0.2]}).key != coat.key
 
 
 def test_equal_tables_become_one_object_and_damaged_ones_are_refused() -> None:

@@ -69,6 +69,8 @@ def test_what_does_not_fit_is_refused():
         Paint.of(np.zeros((3, 3)), np.ones((3, 3)), np.zeros(3), {"roughness": np.zeros(2)})
     with pytest.raises(ValueError, match="do not fit"):
         Paint.of(np.zeros((3, 3)), np.ones((3, 3)), np.zeros(3), {"roughness": np.zeros((3, 2))})
+    with pytest.raises(ValueError, match="looks do not fit"):
+        Paint.of(np.zeros((3, 3)), np.ones((3, 3)), np.zeros(3), {}, np.zeros((2, 3)))
     with pytest.raises(ValueError, match="finite"):
         Paint.of(np.full((3, 3), np.nan), np.ones((3, 3)), np.zeros(3), {})
 
