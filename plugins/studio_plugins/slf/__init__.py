@@ -9,7 +9,7 @@ Light Field Manipulation and Reflectance Optimization", 2013).
   all that return no more light than arrives), `joint` (the fewest numbers that explain a whole stroke),
   `paper` (the paper's choice, element by element)
 - where: `regions`, `elements` (points that stand for all surfaces)
-- how far: `looks`, `spots` and `similarity` (what is alike a stroke), `upsampling` (from elements to all else),
+- how far: `looks`, `spots`, `similarity` (what is alike a stroke), `upsampling` (from elements to all else),
   `field` (the change that is wanted anywhere), `points` and `spread` (paint that has it)
 - `solver`: the door
 """
