@@ -21,9 +21,11 @@ from studio_core.scene.shading_mesh import ShadingMesh
 from studio_core.scene.world_mesh import Placed, assemble
 from studio_core.shading.artifacts import Surfaces
 from studio_core.shading.looks import PictureLooks, looks_vary
+from studio_core.strokes.stroke import Stroke
 from studio_plugins.slf.field import Field
 from studio_plugins.slf.looks import LookTable
 from studio_plugins.slf.points import Known, finer, sufficient
+from studio_plugins.slf.similarity import Reach, likeness_of
 from studio_plugins.slf.spots import SLOTS, Spots, frame_of, joined, on_object
 
 F32 = npt.NDArray[np.float32]
@@ -31,6 +33,8 @@ Bools = npt.NDArray[np.bool_]
 
 SHORTEST = 0.01
 """Metres in the world: edges that are shorter are not cut."""
+RIM = 0.25
+"""Marks of less of a stroke's largest weight are its rim, from which nothing spreads."""
 MIXED = 0.02
 """What vertices stand for has more than one look if its mean is so far from the look of the vertex itself."""
 LEAST_CLEAR = 0.2
@@ -78,6 +82,25 @@ class Spread:
         """The vertices of the unrefined meshes."""
         base = surfaces.unrefined
         return Spots.of_mesh(base.mesh, self._looks(scene, base))
+
+    def marks(self, scene: Scene, surfaces: Surfaces, stroke: Stroke) -> Spots:
+        """Where a stroke lies: its marks that want a change, without the brush's faint rim.
+
+        All of them where none does (something is to stay as it is).
+        """
+        vertices = self.spots(scene, surfaces)
+        if stroke.marks is None or not len(stroke.marks):
+            return vertices.some(np.zeros(0, np.int64))
+        said = stroke.marks
+        meant = (said.wanted != said.shown).any(axis=1)
+        meant &= said.weight > RIM * said.weight.max(initial=0)
+        some = said.some(meant) if meant.any() else said
+        return Spots.of_marks(some, stroke.objects, surfaces.unrefined.mesh, vertices)
+
+    def likeness(self, scene: Scene, surfaces: Surfaces, stroke: Stroke) -> F32:
+        """(V,) how much each vertex of the unrefined meshes would change with a stroke."""
+        vertices, marks = self.spots(scene, surfaces), self.marks(scene, surfaces, stroke)
+        return likeness_of(vertices, marks, Reach.of(stroke), self._workers)
 
     def __call__(
         self, scene: Scene, surfaces: Surfaces, field: Field, under: Mapping[NodeId, Paint] | None = None

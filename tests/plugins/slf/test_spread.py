@@ -13,6 +13,8 @@ from transport_support import Stand, ball, scene_of, thing
 from studio_core.contract import Services
 from studio_core.scene.transform import Transform, axis_angle
 from studio_core.shading.looks import PictureLooks
+from studio_core.strokes.marks import Marks
+from studio_core.strokes.stroke import Stroke
 from studio_plugins.slf.elements import Elements
 from studio_plugins.slf.field import Decided, Field, Varied
 from studio_plugins.slf.similarity import Reach
@@ -202,6 +204,29 @@ def test_changes_of_elements_are_spread_over_their_part(services):
     assert np.sqrt((off**2).mean()) < 0.02
     between = Upsampling.of(elements, vertices)(smooth)[vertices.part == 0, 0]
     assert np.abs(got - between).max() < 0.01 * 0.2
+
+
+def test_a_stroke_says_what_is_alike(services):
+    stand = Stand(room(), 2000)
+    spread = Spread(services)
+    count = 40
+    rng = np.random.default_rng(0)
+    places = (rng.uniform(-0.2, 0.2, (count, 3)) * [1, 0, 1]).astype(np.float32)
+    nothing, up = np.zeros((count, 3), np.float32), np.tile(np.array([0, 1, 0], np.float32), (count, 1))
+    wanted, weight = nothing + 1, np.ones(count, np.float32)
+    places[0], weight[0] = (1.5, 0, 1.5), 0.1  # the rim
+    places[1], wanted[1] = (-1.5, 0, 1.5), 0.0  # is to stay as it is
+    first = np.zeros(count, np.int64)
+    marks = Marks(first, places, up, first, nothing, nothing, wanted, weight, nothing)
+    stroke = Stroke(id="s", objects=("floor",), table=marks.table())
+    whole = spread.likeness(stand.scene, stand.surfaces, stroke)
+    np.testing.assert_array_equal(whole, spread.spots(stand.scene, stand.surfaces).part == 0)
+    near = spread.likeness(stand.scene, stand.surfaces, dataclasses.replace(stroke, near=10.0))
+    away = np.linalg.norm(stand.mesh.positions + stand.mesh.origin, axis=1)
+    assert near[np.argmin(np.where(whole > 0, away, np.inf))] > 0.9
+    assert not near[away > 1.2].any()
+    assert len(spread.marks(stand.scene, stand.surfaces, stroke)) == count - 2
+    assert not spread.likeness(stand.scene, stand.surfaces, Stroke(id="e")).any()
 
 
 def test_marks_on_objects_that_are_gone_reach_nothing(services):
