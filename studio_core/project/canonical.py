@@ -34,13 +34,13 @@ def text_hash(text: str) -> str:
     return hashlib.blake2b(text.encode("utf-8", "surrogatepass"), digest_size=16).hexdigest()
 
 
-def loads(text: str, part: str) -> Any:
+def loads(text: str, part: str, most: int = MAX_TEXT) -> Any:
     """The value of a JSON text; ProjectError naming `part` for anything a project never holds.
 
     Refused beyond what `json` refuses: NaN and infinities (also by overflow, 1e999), integers beyond
-    20 digits, a key twice in one object, nesting beyond the interpreter's depth, texts over 4 MB.
+    20 digits, a key twice in one object, nesting beyond the interpreter's depth, texts over `most` (4 MB).
     """
-    if len(text) > MAX_TEXT:
+    if len(text) > most:
         raise ProjectError(f"{part} is damaged: its text is too long")
     try:
         return json.loads(

@@ -17,6 +17,7 @@ import numpy.typing as npt
 from studio_core.contract import IndirectMethod, Services
 from studio_core.kernels.facing import mark_faces, mark_vertices
 from studio_core.scene.diff import Aspect, Changes, diff, view_changed
+from studio_core.scene.nodes import Scene
 from studio_core.shading.artifacts import (
     Casters,
     DirectRadiance,
@@ -139,9 +140,7 @@ class Handing:
     """What a method's stages get, made from what the backend's stages gave; the same while it is equal."""
 
     def __init__(self, services: Services) -> None:
-        self._table = ShapeTable(services.registry)
-        self._shapes: Shapes | None = None
-        self._own: Kept[Shapes] = Kept()
+        self._shapes = UnrefinedShapes(services)
         self._receivers: Receivers | None = None
         self._roots: Kept[I32] = Kept()
 
@@ -150,22 +149,11 @@ class Handing:
         return {
             Surfaces: inputs[Surfaces].unrefined,
             Casters: inputs[Casters],
-            Shapes: self._unrefined_shapes(frame, inputs),
+            Shapes: self._shapes(frame.scene, inputs[Surfaces], inputs[Shapes]),
             Lighting: inputs[Lighting],
             Receivers: self._seen(frame, inputs),
             DirectRadiance: inputs[DirectRadiance],
         }
-
-    def _unrefined_shapes(self, frame: Frame, inputs: Inputs) -> Shapes:
-        """Rows of the vertices that there are without refinement."""
-        shapes, base = inputs[Shapes], inputs[Surfaces].base
-        if shapes.row is not None and base is not None:
-            table, scene = self._table, frame.scene
-            shapes = self._own(lambda: table(scene, base.materials, base.mesh), shapes, base)
-        known = self._shapes
-        if known is None or (known is not shapes and not same_shapes(known, shapes)):
-            known = self._shapes = shapes
-        return known
 
     def _seen(self, frame: Frame, inputs: Inputs) -> Receivers:
         surfaces, known = inputs[Surfaces], self._receivers
@@ -178,6 +166,25 @@ class Handing:
             seen = unrefined_seen(surfaces, inputs[Hits], roots)
         if known is None or not (np.array_equal(known.seen, seen) and np.array_equal(known.eye, eye)):
             known = self._receivers = Receivers(seen, eye)
+        return known
+
+
+class UnrefinedShapes:
+    """Rows of the vertices that there are without refinement; the same while they are equal."""
+
+    def __init__(self, services: Services) -> None:
+        self._table = ShapeTable(services.registry)
+        self._known: Shapes | None = None
+        self._own: Kept[Shapes] = Kept()
+
+    def __call__(self, scene: Scene, surfaces: Surfaces, shapes: Shapes) -> Shapes:
+        """From the rows of what may be refined."""
+        base, table = surfaces.base, self._table
+        if shapes.row is not None and base is not None:
+            shapes = self._own(lambda: table(scene, base.materials, base.mesh), shapes, base)
+        known = self._known
+        if known is None or (known is not shapes and not same_shapes(known, shapes)):
+            known = self._known = shapes
         return known
 
 
@@ -200,4 +207,4 @@ def unrefined_seen(surfaces: Surfaces, hits: Hits, origins: I32 | None) -> Bools
     return seen
 
 
-__all__ = ["KIND", "IndirectStage", "changed_between", "unrefined_seen", "with_indirect"]
+__all__ = ["KIND", "IndirectStage", "UnrefinedShapes", "changed_between", "unrefined_seen", "with_indirect"]

@@ -59,13 +59,17 @@ class Marks:
         parts = np.split(values[0, 0], np.cumsum(COLUMNS)[:-1], axis=1)
         number, place, normal, slot, eye, shown, wanted, weight, offset = parts
         offset = np.where(offset == UNKNOWN, np.nan, offset)
-        whole = (part[:, 0].astype(np.int64) for part in (number, slot))
-        objects, slots = whole
+        counted = np.concatenate([number, slot], axis=1)
+        if (counted != np.floor(counted)).any() or (counted < 0).any() or (counted > MOST).any():
+            raise ValueError("marks of strokes count objects and slots from 0")
+        objects, slots = counted.astype(np.int64).T
         return Marks(objects, place, normal, slots, eye, shown, wanted, weight[:, 0], offset)
 
 
 COLUMNS = (1, 3, 3, 1, 3, 3, 3, 1, 3)
 WIDTH = sum(COLUMNS)
+MOST = 1 << 20
+"""Objects, and slots of one."""
 UNKNOWN = np.float32(-3e38)
 """Stands for NaN in files, which hold finite numbers alone."""
 

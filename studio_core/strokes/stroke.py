@@ -43,6 +43,11 @@ class Stroke(Node):
     objects: tuple[NodeId, ...] = ()
     table: Table | None = None
 
+    def __post_init__(self) -> None:
+        marks = self.marks
+        if marks is not None and int(marks.object.max()) >= len(self.objects):
+            raise ValueError("a mark names an object that the stroke does not have")
+
     @cached_property
     def marks(self) -> Marks | None:
         """What it says; None of one that holds nothing."""

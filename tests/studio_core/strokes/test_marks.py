@@ -42,7 +42,15 @@ def test_other_tables_are_no_marks() -> None:
 
 
 def test_strokes_change_no_light() -> None:
-    stroke = Stroke(id="s", name="Red", table=marks().table())
+    stroke = Stroke(id="s", name="Red", objects=("a", "b"), table=marks().table())
     before = Scene()
     assert diff(before, before.with_nodes(stroke)).aspects is Aspect.NAME
     assert TAGS["stroke"] is Stroke
+
+
+@pytest.mark.parametrize(("column", "value"), [(0, 2), (0, -1), (0, 0.5), (7, 1e30)])
+def test_strokes_refuse_marks_that_count_wrong(column: int, value: float) -> None:
+    values = marks().table().values.copy()
+    values[0, 0, 2, column] = value
+    with pytest.raises(ValueError, match="mark"):
+        Stroke(id="s", objects=("a", "b"), table=Table(values))
