@@ -15,7 +15,7 @@ from studio_core.errors import InputError, LucarneError
 
 VERBS = (
     *("demo", "new", "info", "copy", "compact", "render", "frames", "radiance", "precompute", "export"),
-    *("capture", "fit-brdf", "fit-material", "materials", "script", "bench", "stress", "doctor"),
+    *("strokes", "capture", "fit-brdf", "fit-material", "materials", "script", "bench", "stress", "doctor"),
 )
 BAD_INPUT, OUR_FAULT, INTERRUPTED, NOBODY_READS = 2, 70, 130, 141
 TRACEBACK = "LUCARNE_TRACEBACK"
@@ -135,6 +135,10 @@ def _run(options: argparse.Namespace) -> int:
                 from studio import verbs_project
 
                 return getattr(verbs_project, options.verb)(options, program) or 0
+            if options.verb == "strokes":
+                from studio.verbs_strokes import strokes
+
+                return strokes(options, program) or 0
             if options.verb == "precompute":
                 from studio.verbs_precompute import precompute
 
@@ -300,8 +304,12 @@ def parser() -> argparse.ArgumentParser:
     export.add_argument("project", type=Path, metavar="PROJECT")
     export.add_argument("-o", "--out", type=Path, required=True, metavar="(OUT.glb|OUT.mtlx|DIR)")
 
-    from studio import capture_options, verbs_captured, verbs_exchange, verbs_materials
+    from studio import capture_options, verbs_captured, verbs_exchange, verbs_materials, verbs_strokes
 
+    strokes = verb("strokes", "paint the light that is wanted, and find the materials that explain it")
+    verbs_strokes.add_options(strokes)
+    _backend_options(strokes)
+    indirect_options.add_options(strokes)
     text = "a room's light from photographs of it, taken at several exposures"
     capture_options.add_options(verb("capture", text))
     text = "the values with which reflectance models come nearest to a measured material"

@@ -8,7 +8,7 @@ import os
 import secrets
 import shutil
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, nullcontext
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -46,7 +46,7 @@ def new(options: argparse.Namespace, program: Headless) -> None:
 
     out = options.out
     check_target(out, (".lucarne",), "projects")
-    with _replacing(out, program) if _holds_something(out) else nullcontext():
+    with replacing_if_there(out, program):
         scene, notes = build(options, program.registry)
         for note in notes:
             program.say(note)
@@ -54,6 +54,11 @@ def new(options: argparse.Namespace, program: Headless) -> None:
     faces = sum(len(node.geometry.faces) for node in scene.nodes.values() if hasattr(node, "geometry"))
     values = {"project": str(out), "nodes": len(scene.nodes), "faces": faces, "notes": notes}
     result(options, program, values, f"{out}: {len(scene.nodes)} nodes, {faces} faces")
+
+
+def replacing_if_there(path: Path, program: Headless) -> AbstractContextManager[None]:
+    """Around the writing of a project; InputError where what is there is none, or somebody has it open."""
+    return _replacing(path, program) if _holds_something(path) else nullcontext()
 
 
 def _holds_something(path: Path) -> bool:

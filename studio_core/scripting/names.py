@@ -29,6 +29,7 @@ from studio_core.scripting.patterns import Patterns
 from studio_core.scripting.placing import Placing
 from studio_core.scripting.shelved import Shelved
 from studio_core.scripting.shown import help_text, overview
+from studio_core.scripting.stroking import Stroking
 from studio_core.session import Session, View
 from studio_core.shading.artifacts import Picture
 from studio_core.shading.job import Job
@@ -58,6 +59,7 @@ GROUPS: dict[str, tuple[str, ...]] = {
         ),
         *("add_model", "add_material", "keep_material", "light_from", "apply", "undo", "redo"),
     ),
+    "Strokes": ("paint", "paint_strokes"),
     "Look and render": ("look_through", "picture", "render"),
     "Files": ("save",),
     "What there is": ("document", "scene", "session", "edits", "nodes", "np", "Path"),
@@ -80,7 +82,7 @@ def at_once(label: str, work: Callable[[Job], T]) -> T:
     return work(Job(label))
 
 
-class Names(Placing, Patterns, Shelved):
+class Names(Placing, Patterns, Shelved, Stroking):
     """Fills `namespace` and keeps its `scene` the current one until `close`.
 
     `services` is asked for when something is rendered; `run(label, work)` does what takes long and gives

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from studio_core.contract import IndirectMethod, Registry, Services, ShadingBackend
+from studio_core.contract import IndirectMethod, Registry, Services, ShadingBackend, StrokeSolver
 from studio_core.errors import EditError
 from studio_core.kernels.visibility import lifted
 from studio_core.params import build, param_infos, parse
@@ -25,7 +25,9 @@ from studio_core.shading.job import Job
 from studio_core.shading.pipeline import Pipeline
 
 
-def backend_params(backend: ShadingBackend | IndirectMethod, values: Mapping[str, object]) -> Any:
+def backend_params(
+    backend: ShadingBackend | IndirectMethod | StrokeSolver, values: Mapping[str, object]
+) -> Any:
     """Its parameters; texts (from the command line) are parsed, names and ranges checked."""
     infos = param_infos(backend.Params)
     parsed = {n: parse(n, infos[n], v) if isinstance(v, str) and n in infos else v for n, v in values.items()}

@@ -21,18 +21,23 @@ SAMPLES = 2
 
 @dataclass(frozen=True)
 class Look:
-    """What is painted on: a camera by name (None: the first) or a view of its own, and pixels."""
+    """What is painted on: what a camera of that name sees (None: the first), who stands at a `place`, or who
+    is `standing` somewhere already; and pixels.
+    """
 
     camera: str | None = None
     place: tuple[Vec3, Vec3] | None = None
     """From where, and to where."""
+    standing: View | None = None
     fov: float = 45.0
     width: int = 960
     height: int = 540
 
     def view(self, scene: Scene) -> View:
         """In a scene; EditError where it has no such camera."""
-        if self.place is None:
+        if self.standing is not None:
+            made = self.standing.sized(self.width, self.height)
+        elif self.place is None:
             made = scene_view(scene, self.camera, self.width, self.height)
         else:
             made = View(looking(*self.place), self.fov, self.width, self.height)

@@ -22,6 +22,7 @@ from studio_core.scripting import Interpreter, Names
 from studio_core.scripting.names import GROUPS
 from studio_core.session import Session
 from studio_core.shading.offline import scene_view
+from studio_core.strokes.stroke import Stroke
 
 PAGE = (Path(__file__).resolve().parents[2] / "docs" / "scripting.md").read_text("utf-8")
 RECIPES = dict(re.findall(r"^### (.+?)\n.*?```python\n(.*?)```", PAGE, re.MULTILINE | re.DOTALL))
@@ -55,6 +56,7 @@ CHECKS: dict[str, Callable[[Scene, Scene, str, Path], bool]] = {
     "A picture through every camera": lambda b, a, said, folder: len([*folder.glob("*.png")]) == 3,
     "The lamp on, the daylight off": lambda b, a, *_: next(a.of(Environment)).hidden,
     "How bright a picture is": lambda b, a, said, _: 0 < float(said.split()[1].rstrip(",")) < 5,
+    "Paint the light that is wanted": lambda b, a, said, _: "%" in said and len([*a.of(Stroke)]) == 1,
     "Stand things on what lies below them": lambda b, a, *_: (
         0 <= a.world("group-armchair").translation[1] < 0.05
     ),

@@ -413,6 +413,7 @@ def test_no_verb_without_a_window_loads_qt(files: Path) -> None:
     shades = np.tile(np.arange(0, 256, 2, dtype=np.uint8)[None, :, None], (64, 1, 3))
     write_photograph(Photograph(shades, ShotFacts("all.jpg"), "0"), files / "all.jpg")
     (files / "script.py").write_text("import studio_core")
+    (files / "strokes.json").write_text('[{"path": [[0.5, 0.5]], "size": [48, 27]}]')
     commands = [
         ["new", "made.lucarne", "--mesh", "box.obj", "--env", "sky.exr", "--floor", "3"],
         ["info", "made.lucarne"],
@@ -426,6 +427,7 @@ def test_no_verb_without_a_window_loads_qt(files: Path) -> None:
         ["demo", "--headless", "-o", "demo.png", *SMALL],
         ["script", "script.py"],
         ["precompute", "made.lucarne", *QUICK],
+        ["strokes", "made.lucarne", "strokes.json", "-o", "painted.lucarne", *QUICK],
         ["capture", "--equirect", "all.jpg", "-o", "light.exr", "--set", "stitch.width=64"],
         ["fit-brdf", "chalk.csv", "--model", "lambert", "-o", "chalk.lucmat"],
         ["fit-material", "ball", "--size", "8", "--no-refine", "--basis", "albedo"],

@@ -1,0 +1,180 @@
+"""`lucarne strokes`: light that is wanted, painted by a file, and the materials that explain it."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from studio.headless import Headless
+from studio.indirect_options import chosen_indirect
+from studio.verbs import check_target, chosen_backend, replacing_if_there, result
+from studio_core.errors import InputError
+
+if TYPE_CHECKING:
+    from studio_core.contract import StrokeSolver
+    from studio_core.scene.nodes import Scene
+    from studio_core.strokes.session import Painted
+
+USUAL = "joint"
+
+
+def add_options(verb: argparse.ArgumentParser) -> None:
+    """All but those of backends and of light between surfaces."""
+    verb.add_argument("project", type=Path, metavar="PROJECT")
+    verb.add_argument("strokes", type=Path, metavar="STROKES.json", help="see docs/strokes.md")
+    text = "a project that is there is kept as OUT~"
+    verb.add_argument("-o", "--out", type=Path, required=True, metavar="OUT.lucarne", help=text)
+    text = "how materials are found: joint, mixed, l0 or l2 (default: %(default)s)"
+    verb.add_argument("--solver", default=USUAL, metavar="ID", help=text)
+    verb.add_argument(
+        "--solver-param",
+        action="append",
+        default=[],
+        metavar="KEY=VALUE",
+        help="a parameter of the solver; may be repeated",
+    )
+    text = "paint each stroke on the picture that those before have made, instead of all on one"
+    verb.add_argument("--one-by-one", action="store_true", help=text)
+    verb.add_argument("--report", type=Path, metavar="JSON", help="what was found, and why")
+
+
+def strokes(options: argparse.Namespace, program: Headless) -> None:
+    """`lucarne strokes`."""
+    from studio.verbs_script import open_project
+    from studio_core.project.records import History
+    from studio_core.project.store import save
+    from studio_core.strokes.files import strokes_from_file
+    from studio_core.strokes.session import Easel, paint_and_solve
+
+    out: Path = options.out
+    check_target(out, (".lucarne",), "projects")
+    if options.report is not None:
+        check_target(options.report, (".json",), "reports")
+    backend, params = chosen_backend(options, program)
+    choice = chosen_indirect(options, program)
+    solver, solver_params = _chosen_solver(options, program)
+    planned = strokes_from_file(options.strokes)
+    document, project = open_project(options.project)
+    easel, services = Easel(backend, params, program.services, choice), program.services
+    with replacing_if_there(out, program):
+        started = time.perf_counter()
+        with program.job("Painting") as job:
+            given = (document.scene, planned, solver, solver_params, easel, services, job)
+            made = paint_and_solve(*given, one_by_one=options.one_by_one)
+        seconds = time.perf_counter() - started
+        for note in made.notes:
+            program.say(note)
+        for edit in made.edits:
+            document.apply(edit)
+        history = History(document.history, document.position)
+        session = None if project is None else project.session
+        save(out, document.scene, label="Strokes", history=history, session=session, fresh=True)
+    told = report(made, document.scene)
+    if options.report is not None:
+        _write(options.report, told)
+    values: dict[str, Any] = {
+        "project": str(options.project),
+        "out": str(out),
+        "solver": options.solver,
+        "backend": backend.id,
+        "indirect": None if choice is None else choice.method,
+        **told,
+        "seconds": round(seconds, 3),
+    }
+    result(
+        options, program, values, "\n".join([f"{out}: {_count(len(made.strokes), 'stroke')}", *_lines(told)])
+    )
+
+
+def _write(path: Path, told: dict[str, Any]) -> None:
+    try:
+        path.write_text(json.dumps(told, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+    except OSError as error:
+        raise InputError(f"{path} cannot be written: {error.strerror or error}") from None
+
+
+def report(made: Painted, scene: Scene) -> dict[str, Any]:
+    """What was found, as JSON has it: strokes, findings with their reasons (best first), notes and counts."""
+
+    def name(node: str) -> str:
+        return scene.nodes[node].name if node in scene.nodes else node
+
+    strokes = [
+        {
+            "id": stroke.id,
+            "name": stroke.name,
+            "tool": stroke.tool,
+            "objects": [name(node) for node in stroke.objects],
+            "places": 0 if stroke.marks is None else len(stroke.marks),
+            "flat": stroke.flat,
+            "indirect": stroke.indirect,
+        }
+        for stroke in made.strokes
+    ]
+    findings = [
+        {
+            "object": name(found.node),
+            "slot": found.slot,
+            "strokes": [name(stroke) for stroke in found.strokes],
+            "reasons": [
+                {
+                    "meaning": reason.meaning or "nothing",
+                    "explained": float(reason.explained),
+                    "score": float(reason.score),
+                    "values": dict(reason.values),
+                }
+                for reason in found.reasons
+            ],
+            "close": found.close,
+            "cannot_tell": list(found.silent),
+        }
+        for found in made.findings
+    ]
+    return {"strokes": strokes, "findings": findings, "notes": list(made.notes), "counts": dict(made.counts)}
+
+
+def _lines(told: dict[str, Any]) -> list[str]:
+    """One a finding, for people."""
+    made = []
+    for found in told["findings"]:
+        if not found["reasons"]:
+            continue
+        best = found["reasons"][0]
+        line = f"{found['object']}, slot {found['slot']}: {best['meaning']}, explains {best['explained']:.0%}"
+        if found["close"]:
+            line += f" ({_count(found['close'], 'other')} nearly as well)"
+        if found["cannot_tell"]:
+            line += f"; cannot tell {', '.join(found['cannot_tell'])} from here"
+        made.append(line)
+    return made
+
+
+def _count(number: int, what: str) -> str:
+    return f"{number} {what}{'' if number == 1 else 's'}"
+
+
+def _chosen_solver(options: argparse.Namespace, program: Headless) -> tuple[StrokeSolver, Any]:
+    """Solver and parameters; InputError for those that there are not."""
+    from studio_core.shading.offline import backend_params
+    from studio_core.strokes.session import KIND
+
+    names = program.registry.names(KIND)
+    if options.solver not in names:
+        raise InputError(f"--solver {options.solver!r}: known are {', '.join(names) or 'none'}")
+    solver: StrokeSolver = program.registry.get(KIND, options.solver)
+    values: dict[str, object] = {}
+    for text in options.solver_param:
+        name, equals, value = text.partition("=")
+        if not equals:
+            raise InputError(f"--solver-param {text!r}: write KEY=VALUE")
+        values[name] = value
+    try:
+        return solver, backend_params(solver, values)
+    except InputError as error:
+        raise InputError(f"--solver-param: {error}") from None
+
+
+__all__ = ["add_options", "report", "strokes"]

@@ -1,0 +1,113 @@
+"""What scripts do with strokes: paint the light that is wanted on what is looked at."""
+
+from __future__ import annotations
+
+import dataclasses
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy.typing as npt
+
+from studio_core.contract import Registry, Services
+from studio_core.document import Document
+from studio_core.errors import InputError
+from studio_core.params import ParamInfo, build, check, param_infos
+from studio_core.scene.nodes import Camera, Scene
+from studio_core.session import Session
+from studio_core.shading.job import Job
+
+if TYPE_CHECKING:
+    from studio_core.strokes.planned import Planned
+    from studio_core.strokes.solution import Finding
+
+
+class Stroking(ABC):
+    """Part of the names that scripts have."""
+
+    _document: Document
+    _session: Session
+    _registry: Registry
+    _services: Callable[[], Services]
+    _run: Callable[[str, Callable[[Job], Any]], Any]
+
+    @property
+    @abstractmethod
+    def scene(self) -> Scene:
+        """The scene as it is now."""
+
+    @abstractmethod
+    def _camera(self, camera: Any) -> Camera:
+        """A camera as it is now."""
+
+    def paint(
+        self,
+        path: npt.ArrayLike,
+        tool: str = "replace",
+        camera: Any = None,
+        size: tuple[int, int] = (960, 540),
+        brush: float = 0.06,
+        hardness: float = 0.7,
+        opacity: float = 1.0,
+        solver: str = "joint",
+        **settings: Any,
+    ) -> tuple[Finding, ...]:
+        """Paint light along places (x, y), 0 … 1 of the picture, and change the materials that explain it.
+
+        `brush` is its size in parts of the height. `settings` are the tool's (`colour` of radiance, `stops`,
+        `radius`, `amount`, `shading`, `source`) and the stroke's (`indirect`, `meaning`, `weight`, `name`).
+        What was found for each object.
+        """
+        from studio_core.strokes.brush import Brush
+        from studio_core.strokes.planned import Look, PaintedStroke
+        from studio_core.strokes.stroke import TOOLS, Stroke
+        from studio_core.strokes.tools import Gesture, ToolSettings
+
+        check("tool", ParamInfo("choice", "Tool", choices=TOOLS), tool)
+        source = settings.pop("source", None)
+        own = {name: settings.pop(name) for name in param_infos(ToolSettings) if name in settings}
+        chosen = dataclasses.replace(build(ToolSettings, own), source=source)
+        known = param_infos(Stroke)
+        for name in settings:
+            if name not in known or name == "tool":
+                told = ", ".join((*param_infos(ToolSettings), "source", *known))
+                raise InputError(f"there is no parameter {name!r}; known: {told}")
+        fields = {name: check(name, known[name], value) for name, value in settings.items()}
+        along = Gesture.of(build(Brush, {"size": brush, "hardness": hardness, "opacity": opacity}), path)
+        width, height = size
+        look = Look(width=width, height=height, standing=self._session.view)
+        if camera is not None:
+            look = Look(self._camera(camera).id, width=width, height=height)
+        return self._paint([PaintedStroke(tool, along, chosen, look, fields)], solver, False)
+
+    def paint_strokes(
+        self, path: str | Path, solver: str = "joint", one_by_one: bool = False
+    ) -> tuple[Finding, ...]:
+        """Paint the strokes of a JSON file (docs/strokes.md) and change the materials that explain them.
+
+        All on one picture and together, or each on what those before have made. What was found.
+        """
+        from studio_core.strokes.files import strokes_from_file
+
+        return self._paint(strokes_from_file(Path(path)), solver, one_by_one)
+
+    def _paint(self, planned: Sequence[Planned], solver: str, one_by_one: bool) -> tuple[Finding, ...]:
+        from studio_core.shading.offline import backend_params, session_choice
+        from studio_core.strokes.session import KIND, Easel, Painted, paint_and_solve
+
+        scene, session, registry, services = self.scene, self._session, self._registry, self._services()
+
+        def work(job: Job) -> Painted:
+            backend, chosen = registry.get("backend", session.backend), registry.get(KIND, solver)
+            params, choice = backend_params(backend, session.params), session_choice(session, registry)
+            easel = Easel(backend, params, services, choice)
+            given = (scene, planned, chosen, chosen.Params(), easel, services, job)
+            return paint_and_solve(*given, one_by_one=one_by_one)
+
+        made: Painted = self._run("Painting", work)
+        for edit in made.edits:
+            self._document.apply(edit)
+        for note in made.notes:
+            print(note)
+        return made.findings

@@ -1,0 +1,74 @@
+"""Strokes in scripts: on what is looked at or through a camera, one step each."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from scenes import little_scene
+
+from studio_core.contract import Services
+from studio_core.document import Document
+from studio_core.errors import EditError, InputError
+from studio_core.scene.nodes import Camera
+from studio_core.scripting import Names
+from studio_core.session import Session, View
+from studio_core.strokes.stroke import Stroke
+
+SIZE = (96, 64)
+CUBE = [(0.48, 0.45), (0.52, 0.45)]
+
+
+@pytest.fixture
+def names(host, workers):
+    document = Document(little_scene(cube_values={"base_color": (0.4, 0.4, 0.4)}))
+    session = Session(View.of(next(document.scene.of(Camera)), document.scene, 320, 200))
+    session.shade_with("reference", {"directions": "1024", "vertices": "600"})
+    session.bounce(False)
+    return Names(document, session, host, lambda: Services(workers, host))
+
+
+def test_what_is_looked_at_is_painted_and_explained(names):
+    (found,) = names.paint(CUBE, colour=(0.4, 0.1, 0.1), size=SIZE, brush=0.15, name="Redder", weight=2)
+    assert found.node == "cube"
+    assert found.reasons[0].meaning == "colour"
+    (stroke,) = names.scene.of(Stroke)
+    assert (stroke.name, stroke.weight, stroke.tool) == ("Redder", 2.0, "replace")
+    assert names.scene["cube"].paint is not None
+    names.undo()
+    assert names.scene["cube"].paint is None
+    assert not [*names.scene.of(Stroke)]
+
+
+def test_another_camera_and_a_file(names, tmp_path: Path):
+    names.paint(CUBE, "brighten", camera="Camera", size=SIZE, stops=0.5)
+    file = tmp_path / "s.json"
+    plain = {"size": SIZE, "path": CUBE}
+    file.write_text(json.dumps([{**plain, "tool": "darken"}, {**plain, "tool": "fixate"}]))
+    names.paint_strokes(file)
+    assert [stroke.tool for stroke in names.scene.of(Stroke)] == ["brighten", "darken", "fixate"]
+    assert len(names.namespace["document"].history) == 3
+
+
+def test_the_background_is_said(names, capsys):
+    before = names.scene
+    assert names.paint([(0.5, 0.02)], size=SIZE) == ()
+    assert "background" in capsys.readouterr().out
+    assert names.scene is before
+
+
+@pytest.mark.parametrize(
+    ("values", "error", "words"),
+    [
+        ({"tool": "spray"}, InputError, "replace"),
+        ({"colour": (1, 2)}, InputError, "colour"),
+        ({"colr": 1}, InputError, "colour"),
+        ({"weight": -1}, InputError, "weight"),
+        ({"brush": 99.0}, InputError, "size"),
+        ({"camera": "Attic"}, EditError, "Attic"),
+    ],
+)
+def test_mistakes_are_told(names, values, error, words):
+    with pytest.raises(error, match=words):
+        names.paint(CUBE, size=SIZE, **values)
