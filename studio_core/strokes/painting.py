@@ -8,6 +8,7 @@ mean over its pixels: noise averages out, and no pixel is lost.
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from dataclasses import dataclass
 from typing import Any
@@ -30,6 +31,11 @@ F64 = npt.NDArray[np.float64]
 I64 = npt.NDArray[np.int64]
 
 LIMIT = 600
+BESIDE = 4
+"""One in so many marks of a flat stroke lies beside it."""
+BESIDE_WEIGHT = 0.1
+FEW, SELDOM = 8, 0.01
+"""Fewer pixels than that, or than that share, are as bright as the brightest by chance."""
 LOOKED_THROUGH = 0.5
 """Of opacity: what lets more light through has no marks."""
 SAME = 1e-4
@@ -48,38 +54,57 @@ class Marked:
     notes: tuple[str, ...] = ()
 
 
+@dataclass(frozen=True, eq=False)
+class _Pixels:
+    """P pixels that show one surface alone: their middle samples, numbers of object and slot, how much they
+    count, and the light (P, 3) shown and wanted.
+    """
+
+    pixel: I64
+    sample: I64
+    group: I64
+    share: F64
+    shown: F32
+    wish: F32
+
+    def __len__(self) -> int:
+        return len(self.pixel)
+
+    def some(self, which: npt.NDArray[np.generic]) -> _Pixels:
+        """These of them."""
+        return _Pixels(*(getattr(self, field.name)[which] for field in dataclasses.fields(self)))
+
+
 def marks_of(picture: Picture, mask: F32, wanted: F32, limit: int = LIMIT) -> Marked:
     """At most `limit` marks of a mask (H, W) over a picture, and of the light wanted there (H, W, 3).
 
-    Pixels count that show one surface with a material alone, and whose light is finite. A stroke on the
-    background has none, and says so. ValueError where the mask does not fit the picture.
+    Pixels count that show one surface with a material alone, and whose light is finite and was not clipped. A
+    stroke on the background has none, and says so. What is painted in one colour also has marks beside it, on
+    the same surfaces, that want what is shown. ValueError where the mask does not fit the picture.
     """
     if mask.shape != picture.linear.shape[:2] or wanted.shape != picture.linear.shape:
         raise ValueError("mask, wanted light and picture have different sizes")
     hits, surfaces = picture.radiance.hits, picture.radiance.surfaces
     if hits is None:
         return Marked((), _no_marks(), notes=(NOTHING_KNOWN,))
-    pixel = np.flatnonzero(mask.reshape(-1) > 0)
-    pixel, sample, group = _of_one_surface(pixel, hits, surfaces)
-    shown, wish = picture.linear.reshape(-1, 3)[pixel], wanted.reshape(-1, 3)[pixel]
-    good = np.isfinite(shown).all(axis=1) & np.isfinite(wish).all(axis=1)
-    pixel, sample, group = pixel[good], sample[good], group[good]
-    if not len(pixel):
+    painted = _read(np.flatnonzero(mask.reshape(-1) > 0), picture, hits, mask, wanted)
+    if not len(painted):
         return Marked((), _no_marks(), notes=(NOTHING_SEEN,))
-    share = mask.reshape(-1)[pixel].astype(np.float64)
-    label, chosen = cells_of(_pixels(hits, surfaces, pixel, sample, group, share), limit)
-    kept = label >= 0
-    shown, wish, share, label = shown[good][kept], wish[good][kept], share[kept], label[kept]
-    total = np.bincount(label, share)
-
-    def mean(light: F32) -> F32:
-        sums = [np.bincount(label, share * light[:, channel]) for channel in range(3)]
-        return np.asarray(np.stack(sums, axis=1) / total[:, None], np.float32)
-
-    weight = np.minimum(total / np.bincount(label).max(), 1).astype(np.float32)
-    objects, placed = _placed(hits, surfaces, sample[chosen])
-    marks = Marks(**placed, shown=mean(shown), wanted=mean(wish), weight=weight, offset=_unknown(len(chosen)))
-    return Marked(objects, marks, not _same(shown) and _same(wish))
+    clipped = _clipped(painted)
+    notes = (f"{clipped.mean():.0%} of the stroke is clipped, and says nothing.",) if clipped.any() else ()
+    painted = painted.some(np.flatnonzero(~clipped))
+    flat = not _same(painted.shown) and _same(painted.wish)
+    parts = [_means(painted, hits, surfaces, limit - limit // BESIDE if flat else limit)]
+    if flat and limit >= BESIDE:
+        beside = _read(_around(mask), picture, hits, np.ones_like(mask), picture.linear)
+        beside = beside.some(np.flatnonzero(np.isin(beside.group, painted.group)))
+        if len(beside):
+            sample, shown, wish, weight = _means(beside, hits, surfaces, limit // BESIDE)
+            parts.append((sample, shown, wish, np.float32(BESIDE_WEIGHT) * weight))
+    sample, shown, wish, weight = (np.concatenate(column) for column in zip(*parts, strict=True))
+    objects, placed = _placed(hits, surfaces, sample)
+    marks = Marks(**placed, shown=shown, wanted=wish, weight=weight, offset=_unknown(len(sample)))
+    return Marked(objects, marks, flat, notes)
 
 
 def stroke_of(marked: Marked, scene: Scene, tool: str, **fields: Any) -> Stroke:
@@ -98,8 +123,9 @@ def stroke_name(scene: Scene, tool: str, objects: tuple[NodeId, ...]) -> str:
     return f"{tool.capitalize()} on {names[0]}{others}"
 
 
-def _of_one_surface(pixel: I64, hits: Hits, surfaces: Surfaces) -> tuple[I64, I64, I64]:
-    """Of pixels those that show one surface alone, their middle samples, and numbers of object and slot."""
+def _read(pixel: I64, picture: Picture, hits: Hits, mask: F32, wanted: F32) -> _Pixels:
+    """Of pixels those that show one surface alone, in finite light."""
+    surfaces = picture.radiance.surfaces
     mesh, count = surfaces.mesh, hits.samples**2
     middle = hits.samples // 2 * (hits.samples + 1)
     faces = hits.face.reshape(-1, count)[pixel]
@@ -113,21 +139,63 @@ def _of_one_surface(pixel: I64, hits: Hits, surfaces: Surfaces) -> tuple[I64, I6
     material = mesh.face_material[faces[:, middle]]
     solid = (surfaces.opacity >= LOOKED_THROUGH) & ~surfaces.catches
     solid = np.append(solid, False)[material]  # −1: no material
+    shown, wish = picture.linear.reshape(-1, 3)[pixel], wanted.reshape(-1, 3)[pixel]
     own = (group == group[:, :1]).all(axis=1) & solid
-    return pixel[own], pixel[own] * count + middle, group[own, middle]
+    own &= np.isfinite(shown).all(axis=1) & np.isfinite(wish).all(axis=1)
+    share = mask.reshape(-1)[pixel].astype(np.float64)
+    made = _Pixels(pixel, pixel * count + middle, group[:, middle], share, shown, wish)
+    return made.some(np.flatnonzero(own))
 
 
-def _pixels(hits: Hits, surfaces: Surfaces, pixel: I64, sample: I64, group: I64, share: F64) -> Pixels:
-    """Pixels (P,) as cells are cut from them."""
-    view = hits.view
+def _clipped(pixels: _Pixels) -> npt.NDArray[np.bool_]:
+    """(P,) where a channel is as bright as in many others, and in none more, though what is shown differs."""
+    most = pixels.wish.max(axis=0)
+    top = (pixels.wish >= most * (1 - SAME)) & (most > 0)
+    several = top.sum(axis=0) >= max(FEW, SELDOM * len(pixels))
+    made: npt.NDArray[np.bool_] = (top & several).any(axis=1)
+    if made.all() or not made.any() or _same(pixels.shown[made]):
+        return np.zeros(len(pixels), np.bool_)
+    return made
+
+
+def _around(mask: F32) -> I64:
+    """Pixels that are not painted, in the box around those that are, half as large again on each side."""
+    rows, columns = (np.flatnonzero((mask > 0).any(axis=axis)) for axis in (1, 0))
+    box = np.zeros(mask.shape, np.bool_)
+    part = []
+    for one in (rows, columns):
+        margin = (int(one[-1]) - int(one[0])) // 2 + 1
+        part.append(slice(max(int(one[0]) - margin, 0), int(one[-1]) + 1 + margin))
+    box[tuple(part)] = True
+    return np.flatnonzero(box & (mask == 0))
+
+
+def _means(pixels: _Pixels, hits: Hits, surfaces: Surfaces, limit: int) -> tuple[I64, F32, F32, F32]:
+    """Of at most `limit` cells: the sample each stands at, mean light shown and wanted, and weight."""
+    label, chosen = cells_of(_cut_from(pixels, hits, surfaces), limit)
+    kept = np.flatnonzero(label >= 0)
+    own, label = pixels.some(kept), label[kept]
+    total = np.bincount(label, own.share)
+
+    def mean(light: F32) -> F32:
+        sums = [np.bincount(label, own.share * light[:, channel]) for channel in range(3)]
+        return np.asarray(np.stack(sums, axis=1) / total[:, None], np.float32)
+
+    weight = np.minimum(total / np.bincount(label).max(), 1).astype(np.float32)
+    return pixels.sample[chosen], mean(own.shown), mean(own.wish), weight
+
+
+def _cut_from(pixels: _Pixels, hits: Hits, surfaces: Surfaces) -> Pixels:
+    """What cells are cut from."""
+    view, sample = hits.view, pixels.sample
     way = np.empty((len(sample), 3), np.float32)
     sample_directions(pinhole(view), sample, way)
     distance = hits.distance[sample]
     angle = np.float32(2 * math.tan(math.radians(view.fov) / 2) / view.rows)
-    number = np.unique(group, return_inverse=True)[1].astype(np.int64)
-    x, y = pixel % view.width, pixel // view.width
+    number = np.unique(pixels.group, return_inverse=True)[1].astype(np.int64)
+    x, y = pixels.pixel % view.width, pixels.pixel // view.width
     normal = _face_normals(surfaces, hits, sample)
-    return Pixels(x, y, number, share, way * distance[:, None], normal, angle * distance)
+    return Pixels(x, y, number, pixels.share, way * distance[:, None], normal, angle * distance)
 
 
 def _face_normals(surfaces: Surfaces, hits: Hits, sample: I64) -> F32:

@@ -207,3 +207,36 @@ def test_strokes_are_named_after_what_they_are_on(scene, shown):
     assert len(stroke.marks) == len(made.marks)
     assert stroke_of(made, scene, "blur", name="Softer").name == "Softer"
     assert stroke_name(scene, "blur", ("gone",)) == "Blur"
+
+
+def test_a_flat_stroke_tells_what_lies_beside_it(shown):
+    seen, hand = Seen.of(shown), Gesture.of(Brush(size=0.15), [(0.5, 0.45)])
+    mask = hand.mask(seen)
+    made = marks_of(shown, mask, wanted("replace", seen, hand, ToolSettings(colour=(0.6, 0.1, 0.1))), 80)
+    assert made.flat
+    beside = (made.marks.wanted == made.marks.shown).all(axis=1)
+    assert 5 < beside.sum() <= 20
+    assert (made.marks.weight[beside] <= 0.1).all()
+    assert set(made.marks.object[beside]) <= set(made.marks.object[~beside]), "and not on other objects"
+    alone = marks_of(shown, mask, wanted("brighten", seen, hand, ToolSettings()), 80)
+    assert not (alone.marks.wanted == alone.marks.shown).all(axis=1).any()
+
+
+def test_what_is_clipped_says_nothing(shown):
+    """A painted picture that was cut off at 70 % of its pixels' brightness."""
+    only = (shown.node == shown.nodes.index("cube")).astype(np.float32)
+    wish = 3 * shown.linear
+    level = np.quantile(wish[only > 0], 0.7, axis=0)
+    made = marks_of(shown, only, np.minimum(wish, level))
+    assert "clipped" in made.notes[0]
+    np.testing.assert_allclose(made.marks.wanted, 3 * made.marks.shown, rtol=1e-3)
+    assert not marks_of(shown, only, wish).notes
+
+
+def test_light_that_is_even_is_not_clipped(shown):
+    half = shown.linear.copy()
+    half[:, : WIDTH // 2] = 2.0
+    even = dataclasses.replace(shown, linear=half)
+    made = marks_of(even, whole(shown), 2 * half)
+    assert made.notes == ()
+    assert (made.marks.wanted == 4).all(axis=1).any()
