@@ -19,6 +19,7 @@ SUITES = {
         "capture": "studio.bench.capture",
         "materials": "studio.bench.materials",
         "interreflection": "studio.bench.interreflection",
+        "strokes": "studio.bench.strokes",
     },
     "stress": {"ui": "studio.bench.stress_ui"},
 }
