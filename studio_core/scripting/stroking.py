@@ -47,34 +47,39 @@ class Stroking(ABC):
         tool: str = "replace",
         camera: Any = None,
         size: tuple[int, int] = (960, 540),
-        brush: float = 0.06,
-        hardness: float = 0.7,
-        opacity: float = 1.0,
-        solver: str = "joint",
         **settings: Any,
     ) -> tuple[Finding, ...]:
-        """Paint light along places (x, y), 0 … 1 of the picture, and change the materials that explain it.
+        """Paint light along places (x, y), 0 … 1 of the picture; materials follow.
 
-        `brush` is its size in parts of the height. `settings` are the tool's (`colour` of radiance, `stops`,
-        `radius`, `amount`, `shading`, `source`) and the stroke's (`indirect`, `meaning`, `weight`, `name`).
-        What was found for each object.
+        `settings` are the brush's (`brush`, its diameter in parts of the height, `hardness`, `opacity`), the
+        tool's (`colour` of radiance, `stops`, `radius`, `amount`, `shading`, `source`) and the stroke's
+        (`indirect`, `meaning`, `weight`, `name`); `solver` says how materials are found. What was found.
         """
         from studio_core.strokes.brush import Brush
         from studio_core.strokes.planned import Look, PaintedStroke
-        from studio_core.strokes.stroke import TOOLS, Stroke
+        from studio_core.strokes.stroke import CLONE, TOOLS, Stroke
         from studio_core.strokes.tools import Gesture, ToolSettings
 
         check("tool", ParamInfo("choice", "Tool", choices=TOOLS), tool)
-        source = settings.pop("source", None)
+        source, solver = settings.pop("source", None), settings.pop("solver", "joint")
+        held = {"size": settings.pop("brush", Brush().size)}
+        held |= {name: settings.pop(name) for name in ("hardness", "opacity") if name in settings}
         own = {name: settings.pop(name) for name in param_infos(ToolSettings) if name in settings}
         chosen = dataclasses.replace(build(ToolSettings, own), source=source)
         known = param_infos(Stroke)
         for name in settings:
             if name not in known or name == "tool":
-                told = ", ".join((*param_infos(ToolSettings), "source", *known))
+                told = ", ".join(
+                    ("brush", "hardness", "opacity", *param_infos(ToolSettings), "source", *known)
+                )
                 raise InputError(f"there is no parameter {name!r}; known: {told}")
         fields = {name: check(name, known[name], value) for name, value in settings.items()}
-        along = Gesture.of(build(Brush, {"size": brush, "hardness": hardness, "opacity": opacity}), path)
+        if tool == CLONE and source is None:
+            raise InputError("a clone needs a source: the place (x, y) where it begins")
+        try:
+            along = Gesture.of(build(Brush, held), path)
+        except ValueError as error:
+            raise InputError(str(error)) from None
         width, height = size
         look = Look(width=width, height=height, standing=self._session.view)
         if camera is not None:
@@ -84,9 +89,9 @@ class Stroking(ABC):
     def paint_strokes(
         self, path: str | Path, solver: str = "joint", one_by_one: bool = False
     ) -> tuple[Finding, ...]:
-        """Paint the strokes of a JSON file (docs/strokes.md) and change the materials that explain them.
+        """Paint the strokes of a JSON file (docs/strokes.md); materials follow.
 
-        All on one picture and together, or each on what those before have made. What was found.
+        All on one picture and explained together, or each on what those before have made. What was found.
         """
         from studio_core.strokes.files import strokes_from_file
 

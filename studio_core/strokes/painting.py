@@ -217,7 +217,9 @@ def _placed(hits: Hits, surfaces: Surfaces, sample: I64) -> tuple[tuple[NodeId, 
     points = surface_points(surfaces, some_hits(hits, sample), eye)
     face = hits.face[sample].astype(np.int64)
     owner = np.searchsorted(mesh.face_offsets, face, side="right") - 1
-    known, number = np.unique(owner, return_inverse=True)
+    known, number, count = np.unique(owner, return_inverse=True, return_counts=True)
+    order = np.argsort(-count, kind="stable")  # what a stroke is mostly on comes first
+    known, number = known[order], np.argsort(order)[number]
     place = points.positions.astype(np.float64) + points.origin
     normal = points.normals.astype(np.float64)
     slot = np.zeros(len(face), np.int64)

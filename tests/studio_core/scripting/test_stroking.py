@@ -62,6 +62,8 @@ def test_the_background_is_said(names, capsys):
     ("values", "error", "words"),
     [
         ({"tool": "spray"}, InputError, "replace"),
+        ({"tool": "clone"}, InputError, "source"),
+        ({"path": [(0.1,)]}, InputError, "a path is"),
         ({"colour": (1, 2)}, InputError, "colour"),
         ({"colr": 1}, InputError, "colour"),
         ({"weight": -1}, InputError, "weight"),
@@ -71,4 +73,4 @@ def test_the_background_is_said(names, capsys):
 )
 def test_mistakes_are_told(names, values, error, words):
     with pytest.raises(error, match=words):
-        names.paint(CUBE, size=SIZE, **values)
+        names.paint(**{"path": CUBE, "size": SIZE} | values)

@@ -200,6 +200,9 @@ def test_slots_are_told(scene, services):
 
 def test_strokes_are_named_after_what_they_are_on(scene, shown):
     made = marks_of(shown, whole(shown), 2 * shown.linear)
+    assert np.bincount(made.marks.object).tolist() == sorted(np.bincount(made.marks.object), reverse=True)
+    part = Brush(size=0.3).mask([(0.5, 0.45), (0.5, 0.6)], WIDTH, HEIGHT)
+    assert marks_of(shown, part, 2 * shown.linear).objects[0] == "cube"
     stroke = stroke_of(made, scene, "brighten", weight=2.0)
     assert stroke.name == "Brighten on Floor and 1 other"
     assert stroke.weight == 2.0
