@@ -1,7 +1,7 @@
 """`lucarne bench strokes`: whether painted light finds the material that was meant, how truly, how quickly.
 
-Each part is a module of its own with `run(report, program)`, and leaves out cases that `--only` does not
-want. What the metrics are stands in benchmarks/README.md.
+Each part is a function of a module of its own, called with (report, program), and leaves out cases that
+`--only` does not want. What the metrics are stands in benchmarks/README.md.
 """
 
 from __future__ import annotations
@@ -12,11 +12,11 @@ from studio.bench.harness import Report
 from studio.headless import Headless
 
 IN_PARTS = True
-PARTS = ("studio.bench.strokes_recovery",)
+PARTS = (("studio.bench.strokes_recovery", "run"), ("studio.bench.strokes_spread", "upsampling"))
 
 
 def run(report: Report, program: Headless) -> None:
     """Every part, one after the other."""
-    for name in PARTS:
-        importlib.import_module(name).run(report, program)
+    for module, name in PARTS:
+        getattr(importlib.import_module(module), name)(report, program)
         report.keep()
