@@ -25,6 +25,7 @@ from studio_core.library.lucmat import SUFFIX as MATERIAL
 from studio_core.parallel import Workers
 from studio_core.params import build
 from studio_core.registry import PluginHost
+from studio_core.scene.nodes import Scene
 from studio_core.session import Session
 from studio_core.shading.artifacts import MeasuredError
 from studio_core.shading.cache import DiskCache
@@ -32,15 +33,17 @@ from studio_core.shading.frame import Frame, IndirectChoice
 from studio_core.shading.job import Job
 from studio_core.shading.pipeline import Pipeline
 from studio_core.shading.scheduler import ComputeThread, Executor
+from studio_core.strokes.solution import Lit
 from studio_ui.ask import Ask
 from studio_ui.bridge import Bridge
 from studio_ui.canvas.raster_viewport import RasterViewport
 from studio_ui.canvas.switch_viewport import SwitchViewport
 from studio_ui.context import Context
 from studio_ui.editing import Editing
-from studio_ui.feed import PictureFeed, Shading
+from studio_ui.feed import PictureFeed
 from studio_ui.files.thumbnails import Thumbnails
 from studio_ui.journal import Journal
+from studio_ui.lazy_pipeline import Shading
 from studio_ui.main_window import MainWindow
 from studio_ui.plugins.dialog import OFF
 from studio_ui.preferences.catalogue import SYSTEM
@@ -74,6 +77,12 @@ class PluginShading:
         self._meter = self._meter or SteadyMeter(ErrorMeter(self._services))
         found: MeasuredError | None = self._meter(pipeline, frame, job)
         return found
+
+    def lit(self, pipeline: Pipeline, scene: Scene) -> Lit | None:
+        """What the pipeline's newest frame has for solvers of strokes."""
+        from studio_core.strokes.lit import lit_of
+
+        return lit_of(pipeline, scene)
 
     def params(self, backend: str, values: Mapping[str, Any]) -> Any:
         """The backend's parameters, checked."""

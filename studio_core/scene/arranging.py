@@ -16,12 +16,13 @@ from studio_core.scene.bounds import exact_bounds
 from studio_core.scene.capture import Capture
 from studio_core.scene.nodes import Environment, NodeId, Scene
 from studio_core.scene.transform import Transform, axis_angle, vec3
+from studio_core.strokes.stroke import Stroke
 
 F64 = npt.NDArray[np.float64]
 Side = Literal["low", "middle", "high"]
 Placed = dict[NodeId, Transform]
 UP = (0.0, 1.0, 0.0)
-PLACELESS = (Environment, Capture)
+PLACELESS = (Environment, Capture, Stroke)
 """Kinds of nodes that stand nowhere: nothing moves, groups or copies them."""
 
 

@@ -116,7 +116,7 @@ class Pipeline:
     """Runs stages in order over frames. Owned by the compute thread.
 
     Artifacts of the kinds `handed` are not made here: they are handed over with every frame, and count as
-    rebuilt where they are other objects than before.
+    rebuilt where they are other objects than before. `frame` is the newest whose changes are known.
     """
 
     def __init__(self, stages: Sequence[Stage], handed: Sequence[type] = ()) -> None:
@@ -131,6 +131,7 @@ class Pipeline:
         self.stages = tuple(stages)
         self.current = 0
         self.rounds = 0
+        self.frame: Frame | None = None
         self.report: list[StageRun] = []
         self._records: list[_Record] | None = None
         self._handed: dict[type, tuple[Any, int]] = dict.fromkeys(handed, (None, 0))
@@ -144,8 +145,27 @@ class Pipeline:
                 return found
         return None
 
+    def settled(self, kind: type[A]) -> A | None:
+        """What `artifact` gives where it belongs to `frame`: cancelled work has not left it behind."""
+        return self.artifact(kind) if self._is_settled(kind) else None
+
+    def _is_settled(self, kind: type) -> bool:
+        """Whether the stage that gives it would not run again, but to refine, nor one that it needs."""
+        if kind in self._handed:
+            return True
+        stamps = {stage.gives: r.stamp for stage, r in zip(self.stages, self._records or (), strict=False)}
+        for stage, record in zip(self.stages, self._records or (), strict=False):
+            if stage.gives is kind:
+                fresh = record.stamp > 0 and not stage.dirtied_by & record.pending.aspects
+                own = (need for need in stage.needs if need not in self._handed)
+                return fresh and all(
+                    record.seen.get(need) == stamps[need] and self._is_settled(need) for need in own
+                )
+        return False
+
     def mark(self, frame: Frame, changes: Changes) -> None:
         """Remember what changed for every stage."""
+        self.frame = frame
         if self._records is None:
             self._records = [_Record(everything(frame.scene)) for _ in self.stages]
         else:

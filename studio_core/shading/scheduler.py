@@ -99,6 +99,20 @@ def _attempt(job: Job, work: Callable[[], Any]) -> tuple[Any, Exception | None]:
         job.ended = True
 
 
+def _tell_cancelled(question: _Question) -> None:
+    question.job.cancel()
+    question.done(None, Cancelled(question.job.label))
+
+
+@dataclass(frozen=True)
+class _Question:
+    """Work on what the pipeline has made, and who is told of its result or its error."""
+
+    work: Callable[[Pipeline, Job], Any]
+    done: Callable[[Any, Exception | None], None]
+    job: Job
+
+
 @dataclass(frozen=True)
 class _Spare:
     """Work for when nothing waits, and who is told of its result."""
@@ -119,6 +133,9 @@ class Scheduler:
     meter; its result comes as `measured(frame, result)`. If it `completes`, the pipeline then does what no
     picture needs yet; after that the spare runs `again` while its result asks for it. Any request cancels
     either.
+
+    Questions (`ask`) are answered between frames, in turn with them. Spare work and further rounds of a frame
+    at rest make way for them, and go on afterwards.
     """
 
     def __init__(
@@ -151,6 +168,11 @@ class Scheduler:
         self._completes = completes
         self._again = again
         self._spare_job: Job | None = None
+        self._left: tuple[Frame, tuple[_Spare, ...]] | None = None  # what made way for a question
+        self._questions: dict[str, _Question] = {}
+        self._asked: tuple[str, _Question] | None = None  # is being answered
+        self._frames_turn = False
+        self._makes_way = False
 
     @property
     def busy(self) -> bool:
@@ -171,14 +193,71 @@ class Scheduler:
         if self._waiting is not None:
             changes = self._waiting[1] | changes
         self._waiting = (frame, changes)
+        self._left = None
+        if self._asked is not None:
+            return self._revision
         if self._job is None:
             self._start()
         elif self._job is self._spare_job or self.pipeline.dirties(changes, self.pipeline.current):
             self._job.cancel()
         return self._revision
 
+    def ask(
+        self, name: str, work: Callable[[Pipeline, Job], Any], done: Callable[[Any, Exception | None], None]
+    ) -> Job:
+        """Do `work(pipeline, job)` on the executor between frames; then `done(result, error)` here.
+
+        A newer question of the same name cancels an older one, which is then told Cancelled.
+        """
+        job = Job(name, on_progress=lambda j: self._post(lambda: self.progress.emit(j)))
+        asked = self._questions.pop(name, None)
+        if asked is not None:
+            _tell_cancelled(asked)
+        elif self._asked is not None and self._asked[0] == name:
+            self._asked[1].job.cancel()
+        question = self._questions[name] = _Question(work, done, job)
+        if self._closed:
+            del self._questions[name]
+            _tell_cancelled(question)
+        elif self._job is None and self._asked is None:
+            self._go_on()
+        else:
+            self._make_way()
+        return job
+
+    def _make_way(self) -> None:
+        """What is not urgent stops where a question waits; it goes on after the answer."""
+        refines = self._job is not self._spare_job and self.pipeline.rounds > 0
+        if self._questions and self._job is not None and (self._job is self._spare_job or refines):
+            self._makes_way = True
+            self._job.cancel()
+
+    def _answer(self) -> None:
+        name = next(iter(self._questions))
+        question = self._questions.pop(name)
+        self._asked, self._frames_turn = (name, question), True
+
+        def run() -> None:
+            def work() -> Any:
+                question.job.checkpoint()
+                return question.work(self.pipeline, question.job)
+
+            result, error = _attempt(question.job, work)
+            self._post(lambda: finish(result, error))
+
+        def finish(result: Any, error: Exception | None) -> None:
+            self._asked = None
+            try:
+                question.done(result, error)
+            finally:
+                if self._asked is None and self._job is None:
+                    self._go_on()
+
+        self._executor.submit(run)
+
     def cancel(self) -> None:
         """Stop what runs and forget what waits; its changes are kept for the next request."""
+        self._left = None
         if self._waiting is not None:
             frame, changes = self._waiting
             self._waiting = None
@@ -190,13 +269,24 @@ class Scheduler:
         """Cancel and take no more requests."""
         self._closed = True
         self.cancel()
+        asked, self._questions = self._questions, {}
+        for question in asked.values():
+            _tell_cancelled(question)
+        if self._asked is not None:
+            self._asked[1].job.cancel()
+
+    def _progressed(self, job: Job) -> None:
+        self.progress.emit(job)
+        if job is self._job:
+            self._make_way()
 
     def _start(self) -> None:
         assert self._waiting is not None
         (frame, changes), self._waiting = self._waiting, None
+        self._frames_turn = False
         job = Job(
             self.label,
-            on_progress=lambda j: self._post(lambda: self.progress.emit(j)),
+            on_progress=lambda j: self._post(lambda: self._progressed(j)),
             on_publish=lambda artifact: self._post(lambda: self._show(frame, artifact, False)),
         )
         self._job = job
@@ -208,9 +298,12 @@ class Scheduler:
 
     def _finish(self, frame: Frame, job: Job, result: Any, error: Exception | None) -> None:
         self._job = None
+        made_way, self._makes_way = self._makes_way, False
         try:
             if isinstance(error, Cancelled):
                 self.cancelled_jobs += 1
+                if made_way and self._waiting is None and not self._closed:
+                    self._waiting = (frame, Changes())
             elif error is not None:
                 self.failed.emit(frame, error)
             else:
@@ -223,14 +316,22 @@ class Scheduler:
                 self._go_on()
 
     def _go_on(self) -> None:
-        if self._waiting is not None and not self._closed:
+        if self._asked is not None or self._job is not None:
+            return
+        if self._questions and not (self._frames_turn and self._waiting is not None):
+            self._answer()
+        elif self._waiting is not None and not self._closed:
             self._start()
-        elif self._job is None:
+        elif self._left is not None:
+            (frame, steps), self._left = self._left, None
+            self._spare_time(frame, steps)
+        else:
             self.idle.emit()
 
     def _spare_time(self, frame: Frame, steps: tuple[_Spare, ...]) -> None:
         """Runs the first of the steps, then the others, while nobody asks for anything."""
-        if not steps:
+        if not steps or self._questions or self._asked is not None:
+            self._left = (frame, steps) if steps else None
             self._go_on()
             return
         step, rest = steps[0], steps[1:]
@@ -243,6 +344,7 @@ class Scheduler:
 
         def finish(result: Any, error: Exception | None) -> None:
             self._job = self._spare_job = None
+            made_way, self._makes_way = self._makes_way, False
             idle = error is None and self._waiting is None and not self._closed
             try:
                 if error is not None and not isinstance(error, Cancelled):
@@ -254,6 +356,8 @@ class Scheduler:
                     more = (step,) if step.again(result) else ()
                     self._spare_time(frame, (*rest, *more))
                 else:
+                    if made_way and isinstance(error, Cancelled) and self._waiting is None:
+                        self._left = (frame, steps)
                     self._go_on()
 
         self._executor.submit(run)

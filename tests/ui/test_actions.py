@@ -83,7 +83,7 @@ def test_conditions_enable_and_check(qtbot: QtBot) -> None:
     done: list[int] = []
     handlers, conditions = gather([_Feature(HANDLERS, CONDITIONS)])
     state = {"undo": False, "grid": True, "tool_move": True, "tool_select": False, "tool_rotate": False}
-    state["tool_scale"] = False
+    state["tool_scale"] = state["tool_stroke"] = False
     conditions |= {name: lambda name=name: state[name] for name in state}  # type: ignore[misc]
     made = ActionSet(owner, owner, handlers, conditions, lambda: done.append(1))
     made.refresh()

@@ -16,6 +16,7 @@ class Editing:
     def __init__(self, document: Document, refuse: Callable[[str, BaseException], object]) -> None:
         self.document = document
         self.began: Signal[[]] = Signal()  # a gesture started: pictures should come quickly
+        self.finishing: Signal[[]] = Signal()  # it is about to stay as it is: the last moment to preview
         self.settled: Signal[[]] = Signal()  # it ended: they may take their time again
         self.done: Signal[[Edit]] = Signal()  # an edit went into the history, or a gesture's last one
         self.stepped: Signal[[int]] = Signal()  # so many steps back or forward in the history
@@ -79,6 +80,7 @@ class Editing:
         """Commit whatever gesture is under way."""
         if self._gesture is None:
             return
+        self.finishing.emit()
         changed, last = self.document.scene is not self._gesture.start, self._last
         self._end(self.document.commit)
         if changed and last is not None:

@@ -10,10 +10,10 @@ from __future__ import annotations
 
 import dataclasses
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
-from typing import Any, Protocol
+from typing import Any
 
 from studio_core.document import Document
 from studio_core.scene.diff import Aspect, Changes, everything, view_changed
@@ -22,9 +22,9 @@ from studio_core.session import Session, View
 from studio_core.shading.artifacts import MeasuredError, Picture
 from studio_core.shading.frame import Frame, IndirectChoice
 from studio_core.shading.job import Job
-from studio_core.shading.pipeline import Pipeline
 from studio_core.shading.scheduler import Executor, Scheduler
 from studio_core.signal import Signal
+from studio_ui.lazy_pipeline import LazyPipeline, Shading
 from studio_ui.pace import Pace
 
 _SLOW = Aspect.TRANSFORM | Aspect.STRUCTURE
@@ -33,6 +33,10 @@ _LOOKS = Aspect.MATERIAL | Aspect.LIGHT | Aspect.GAIN | Aspect.NAME
 """What leaves every surface where it is."""
 REST_MS = 260
 REST_PIXELS, REST_SAMPLES = 2_400_000, 4_500_000
+
+
+Answering = Callable[[Any, Job], Any]
+"""What is asked of the compute thread: with its `LazyPipeline`, and a job that tells when to stop."""
 
 
 class Freshness(Enum):
@@ -54,81 +58,6 @@ class Shown:
     final: bool
     seconds: float
     moving: bool = False
-
-
-class Shading(Protocol):
-    """What the composition root provides: pipelines and their parameters by backend.
-
-    Both are called on the compute thread alone, since they import what is heavy.
-    """
-
-    def pipeline(self, backend: str) -> Pipeline:
-        """Fresh stages that end in a Picture."""
-        ...
-
-    def params(self, backend: str, values: Mapping[str, Any]) -> Any:
-        """The backend's parameters."""
-        ...
-
-    def indirect(self, choice: IndirectChoice) -> IndirectChoice | None:
-        """The choice with its parameters instead of their values by name; None for an unknown method."""
-        ...
-
-    def measure(self, pipeline: Pipeline, frame: Frame, job: Job) -> MeasuredError | None:
-        """How wrong the pipeline's last picture is."""
-        ...
-
-
-class LazyPipeline:
-    """A pipeline that is made when the compute thread first needs it."""
-
-    def __init__(self, shading: Shading, backend: str) -> None:
-        self._shading, self._backend = shading, backend
-        self._made: Pipeline | None = None
-        self._error: Exception | None = None
-
-    @property
-    def current(self) -> int:
-        """Index of the stage that runs."""
-        return self._made.current if self._made is not None else 0
-
-    def dirties(self, changes: Changes, upto: int) -> bool:
-        """Whether a stage at or before index `upto` would rerun."""
-        return self._made.dirties(changes, upto) if self._made is not None else bool(changes)
-
-    def mark(self, frame: Frame, changes: Changes) -> None:
-        """Remember what changed; a pipeline that was not made yet starts with everything anyway."""
-        if self._made is not None:
-            self._made.mark(frame, changes)
-
-    def update(self, frame: Frame, changes: Changes, job: Job) -> Any:
-        """See `Pipeline.update`; raises again what making it raised."""
-        if self._error is not None:
-            raise self._error
-        if self._made is None:
-            try:
-                self._made = self._shading.pipeline(self._backend)
-            except Exception as error:
-                self._error = error
-                raise
-        return self._made.update(self._ready(frame), changes, job)
-
-    def complete(self, frame: Frame, job: Job) -> None:
-        """See `Pipeline.complete`."""
-        if self._made is not None:
-            self._made.complete(self._ready(frame), job)
-
-    def measure(self, frame: Frame, job: Job) -> MeasuredError | None:
-        """The error of what was last made; see `Shading.measure`."""
-        if self._made is None:
-            return None
-        return self._shading.measure(self._made, self._ready(frame), job)
-
-    def _ready(self, frame: Frame) -> Frame:
-        """With parameters instead of values by name."""
-        params = self._shading.params(self._backend, frame.params)
-        choice = None if frame.indirect is None else self._shading.indirect(frame.indirect)
-        return dataclasses.replace(frame, params=params, indirect=choice)
 
 
 class PictureFeed:
@@ -227,6 +156,24 @@ class PictureFeed:
         """Ask for everything again."""
         self.want(everything(self._document.scene))
 
+    def ask(self, name: str, work: Answering, done: Callable[[Any, Exception | None], None]) -> Job:
+        """Do `work(pipeline, job)` on the compute thread between pictures; then `done(result, error)` here.
+
+        The newest of a name wins; the others are told Cancelled.
+        """
+        return self._scheduler.ask(name, work, done)
+
+    def another(self) -> LazyPipeline:
+        """A pipeline beside the picture's, with the session's backend; for the compute thread."""
+        return LazyPipeline(self._shading, self._backend)
+
+    def frame(self, scene: Scene, view: View, *, moving: bool = False) -> Frame:
+        """What the session asks for, of any scene and view."""
+        session = self._session
+        by_name = session.indirect_params.get(session.indirect, {})
+        choice = IndirectChoice(session.indirect, by_name) if session.bouncing else None
+        return Frame(scene, view, session.params, 0, moving, indirect=choice, light=session.light)
+
     def cancel(self) -> None:
         """Stop and keep what is shown."""
         self._changes = Changes()
@@ -314,12 +261,7 @@ class PictureFeed:
         view = self.frame_view(quick)
         if view != self._asked_view:  # other pixels concern stages as another eye does
             changes, self._asked_view = changes | view_changed(), view
-        session = self._session
-        by_name = session.indirect_params.get(session.indirect, {})
-        choice = IndirectChoice(session.indirect, by_name) if session.bouncing else None
-        frame = Frame(
-            self._document.scene, view, session.params, 0, moving, indirect=choice, light=session.light
-        )
+        frame = self.frame(self._document.scene, view, moving=moving)
         asked, finer_only, self._finer_only = self._clock(), self._finer_only, True
         revision = self._revision = self._revision + 1  # as the scheduler counts
         self._asked[revision] = asked

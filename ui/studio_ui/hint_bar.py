@@ -9,6 +9,7 @@ from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QSizePolicy, QToolBut
 
 from studio_core.scene.diff import Aspect, Changes
 from studio_core.scene.nodes import Environment, Scene
+from studio_core.strokes.stroke import Stroke
 from studio_ui.context import Context, Subscriptions
 from studio_ui.look.fitting import show_what_fits
 from studio_ui.look.icons import icon
@@ -32,14 +33,14 @@ def _light_turned(before: Scene, after: Scene, changes: Changes) -> bool:
     )
 
 
-def _repainted(before: Scene, after: Scene, changes: Changes) -> bool:
-    return bool(changes.aspects & Aspect.MATERIAL)
+def _painted(before: Scene, after: Scene, changes: Changes) -> bool:
+    return any(isinstance(after.nodes.get(node), Stroke) for node in changes.nodes)
 
 
 STEPS: tuple[tuple[Test, str], ...] = (
     (_moved, "Click furniture, then drag it"),
     (_light_turned, "Shift+right-drag turns the light"),
-    (_repainted, "Change a colour under Materials"),
+    (_painted, "Press P, then paint light on something"),
 )
 _HEIGHT, _MARGIN, _GAP = 32, 10, 22
 

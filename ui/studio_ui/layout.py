@@ -19,7 +19,7 @@ _HIDDEN = ("console", "capture")  # at first, and what plugins bring
 _TABS = (
     ("outliner", "library"),
     ("history", "cameras", "jobs", "log"),
-    ("properties", "materials", "lighting", "shading"),
+    ("properties", "materials", "lighting", "shading", "strokes"),
 )
 
 

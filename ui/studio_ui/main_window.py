@@ -64,6 +64,8 @@ from studio_ui.quality import QualityControl
 from studio_ui.settings import Settings
 from studio_ui.shortcuts import Shortcuts
 from studio_ui.status import StatusBar
+from studio_ui.strokes.feature import StrokeFeature
+from studio_ui.strokes.panel import StrokePanel
 from studio_ui.toolbar import Toolbar
 from studio_ui.views.aids import ViewAids
 from studio_ui.views.between import Between
@@ -184,6 +186,15 @@ class MainWindow(QMainWindow):
         self.panels, self.docks = self.layout_.panels, self.layout_.docks
         self.capture = CaptureFeature(context, self.capture_panel, lambda: self.layout_.show("capture"))
         self.fitting = MaterialFitting(self, context, self.ask, self.library, self.taking)
+        self.strokes = StrokeFeature(
+            context,
+            viewport,
+            self.tools,
+            settings,
+            self.stroke_panel,
+            self.status.say,
+            lambda: self.layout_.show("strokes"),
+        )
         self.keyboard = Keyboard(self, lambda: viewport.inner.widget, self.docks)
         chosen = PreferencesFeature(
             self, self.preferences, self.shortcuts, context.tasks, user_cache() / "computed"
@@ -227,6 +238,7 @@ class MainWindow(QMainWindow):
             self.rooms,
             self.capture,
             self.fitting,
+            self.strokes,
         ]
 
     def _panels(self) -> list[tuple[Panel, Qt.DockWidgetArea]]:
@@ -237,6 +249,7 @@ class MainWindow(QMainWindow):
             self.context, self.ask, self.settings, self.files.beside, lambda: self.files.folder
         )
         seen, capture = self.camera_pictures, self.capture_panel
+        self.stroke_panel = StrokePanel(self.context)
         self.library = MaterialLibrary(self.context, self.ask)
         self.library.opened.connect(lambda: self.layout_.show("library"))
         self.files.material = self.library.open
@@ -251,6 +264,7 @@ class MainWindow(QMainWindow):
             self.cameras,
             seen,
             capture,
+            self.stroke_panel,
             self.library,
             self.taking,
             lambda: self.layout_.show("library"),
@@ -326,6 +340,7 @@ class MainWindow(QMainWindow):
         self.context.tasks.cancel()
         self.pictures.close()
         self.fitting.close()
+        self.strokes.close()
         self.files.close()
         self.following.close()
         self.effects.close()

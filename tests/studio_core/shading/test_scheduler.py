@@ -22,7 +22,7 @@ from random_edits import random_edit
 from scenes import little_scene
 
 from studio_core import edits
-from studio_core.errors import EditError
+from studio_core.errors import Cancelled, EditError
 from studio_core.scene.diff import Changes, diff, view_changed
 from studio_core.scene.nodes import Scene
 from studio_core.scene.transform import Transform
@@ -563,3 +563,129 @@ def test_names_disturb_no_round() -> None:
     bench.executor.drain()
     assert bench.scheduler.cancelled_jobs == 0
     assert [revision for revision, _, final in bench.shown if final] == [1, 2]
+
+
+# ---------------------------------------------------------------- questions
+
+
+class Told:
+    """What was asked, and what came of it."""
+
+    def __init__(self) -> None:
+        self.results: list[Any] = []
+
+    def __call__(self, result: Any, error: Exception | None) -> None:
+        self.results.append(result if error is None else type(error))
+
+
+def picture_of(pipeline: Pipeline, job: Job) -> Any:
+    return pipeline.artifact(Picture)
+
+
+def test_a_question_is_answered_with_what_was_last_made(bench: Bench) -> None:
+    told = Told()
+    bench.scheduler.ask("why", picture_of, told)
+    bench.executor.drain()
+    assert told.results == [bench.truth()]
+    assert bench.runs() == [0] * 6
+    assert bench.idle == 2
+
+
+def test_questions_and_frames_take_turns(bench: Bench) -> None:
+    order: list[str] = []
+    bench.scheduler.shown.connect(lambda frame, artifact, final: order.append(f"frame {frame.revision}"))
+
+    def ask(*_: object) -> None:
+        if order.count("answer") < 3:
+            bench.scheduler.ask("why", lambda pipeline, job: None, lambda *_: (order.append("answer"), ask()))
+
+    bench.edit(move(1.0))
+    ask()
+    bench.executor.step()
+    bench.edit(tint(0.2))
+    bench.edit(tint(0.4))
+    bench.executor.drain()
+    assert order == ["frame 2", "answer", "frame 4", "answer", "answer"]
+    assert bench.shown[-1] == (4, bench.truth(), True)
+
+
+def test_the_newest_question_of_a_name_wins(bench: Bench) -> None:
+    old, other, new = Told(), Told(), Told()
+    bench.edit(move(1.0))
+    bench.scheduler.ask("why", picture_of, old)
+    bench.scheduler.ask("where", lambda pipeline, job: "here", other)
+    bench.scheduler.ask("why", picture_of, new)
+    bench.executor.drain()
+    assert old.results == [Cancelled]
+    assert (other.results, new.results) == (["here"], [bench.truth()])
+
+
+def test_a_question_under_way_is_cancelled_by_a_newer_one(bench: Bench) -> None:
+    old, new = Told(), Told()
+
+    def work(pipeline: Pipeline, job: Job) -> None:
+        bench.scheduler.ask("why", picture_of, new)
+        job.checkpoint()
+
+    bench.scheduler.ask("why", work, old)
+    bench.executor.drain()
+    assert old.results == [Cancelled]
+    assert new.results == [bench.truth()]
+
+
+def test_spare_work_and_refinement_make_way_for_questions_and_go_on() -> None:
+    told: list[tuple[str, Any]] = []
+    bench = Bench(stages=refining_stages())
+
+    def spare(pipeline: Pipeline, frame: Frame, job: Job) -> str:
+        if not any(what == "spare" for what, _ in told):
+            told.append(("spare", None))
+            scheduler.ask("why", picture_of, lambda result, error: told.append(("asked", result)))
+            job.checkpoint()
+        return "measured"
+
+    scheduler = Scheduler(Pipeline(bench.stages), bench.executor, spare=spare)
+    scheduler.shown.connect(lambda frame, artifact, final: told.append(("shown", final)))
+    scheduler.measured.connect(lambda frame, result: told.append(("measured", result)))
+    detail = next(stage for stage in bench.stages if isinstance(stage, DetailStage))
+
+    def interrupt(stage: Stage) -> None:
+        if detail.proposed is not None and not any(what == "early" for what, _ in told):
+            told.append(("early", None))
+            scheduler.ask("how", picture_of, lambda result, error: told.append(("early answer", error)))
+
+    detail.interrupt = interrupt
+    scheduler.request(Frame(bench.scene, bench.view, None), Changes())
+    bench.executor.drain()
+    names = [what for what, _ in told]
+    assert names.index("early answer") == names.index("early") + 1, "it did not wait for the last round"
+    assert told[-3][0] == "spare"
+    assert told[-2][0] == "asked"
+    assert told[-2][1][-1] == DetailStage.most
+    assert told[-1] == ("measured", "measured")
+    assert not scheduler.busy
+
+
+@pytest.mark.parametrize("error", [ZeroDivisionError("bug"), SystemExit(3), MemoryError()])
+def test_a_question_that_fails_disturbs_nothing(bench: Bench, error: BaseException) -> None:
+    told = Told()
+
+    def work(pipeline: Pipeline, job: Job) -> None:
+        raise error
+
+    bench.scheduler.ask("why", work, told)
+    bench.edit(move(1.0))
+    bench.executor.drain()
+    assert len(told.results) == 1
+    assert bench.shown[-1] == (2, bench.truth(), True)
+    assert bench.failures == []
+
+
+def test_who_asks_a_closed_scheduler_is_told_so(bench: Bench) -> None:
+    waiting, late = Told(), Told()
+    bench.edit(move(1.0))
+    bench.scheduler.ask("why", picture_of, waiting)
+    bench.scheduler.close()
+    bench.scheduler.ask("where", picture_of, late)
+    bench.executor.drain()
+    assert waiting.results == late.results == [Cancelled]

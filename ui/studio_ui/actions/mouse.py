@@ -10,5 +10,8 @@ MOUSE = (
     ("Along an axis", "X, Y or Z, before a drag or in it; Shift+X: along the other two"),
     ("An exact amount", "Type it while dragging: 80 cm, 2'6\", 45°; Enter keeps it"),
     ("With and without snapping", "M; while dragging hold Ctrl"),
+    ("Paint light", "P, then drag; Shift: straight; Esc takes it back"),
+    ("Pick a colour of the picture", "P, then Alt+click; Ctrl+click: where cloning takes it from"),
+    ("Size and hardness of the brush", "[ and ], Ctrl+wheel; Shift+[ and Shift+], Ctrl+Shift+wheel"),
     ("Choose in a box", "Q or B, then drag: to the right what lies inside, to the left what is touched"),
 )

@@ -154,6 +154,16 @@ class BaseViewport(Hand):
         size = (width * shrink, height * shrink)
         return QRectF((room.width() - size[0]) / 2, (room.height() - size[1]) / 2, *size)
 
+    def placed(self) -> tuple[float, float, float, float]:
+        """Where the picture lies on the canvas: left, top, right, bottom, 0…1 from the top left."""
+        room, width, height = self.target(), max(self.width(), 1), max(self.height(), 1)
+        return (
+            room.left() / width,
+            room.top() / height,
+            (room.left() + room.width()) / width,
+            (room.top() + room.height()) / height,
+        )
+
     def probe(self, x: float, y: float) -> Probe | None:
         """What the shown picture has at a point of the canvas."""
         if self._picture is None:

@@ -73,7 +73,26 @@ class Band:
     whole: bool = False
 
 
-Mark = Wires | Dot | Face | Label | Band
+@dataclass(frozen=True, eq=False)
+class Ring:
+    """A circle about a point (x, y) of the canvas, 0…1 from the top left; `radius` logical pixels."""
+
+    at: tuple[float, float]
+    radius: float
+    colour: str = "line"
+    width: float = 1.0
+
+
+@dataclass(frozen=True, eq=False)
+class Film:
+    """Pixels (H, W, 4) as displayed, the last their opacity, over a rectangle as `Band` has it."""
+
+    pixels: npt.NDArray[np.uint8]
+    start: tuple[float, float]
+    end: tuple[float, float]
+
+
+Mark = Wires | Dot | Face | Label | Band | Ring | Film
 
 
 @dataclass(frozen=True)

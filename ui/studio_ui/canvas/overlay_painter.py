@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 from PySide6.QtCore import QLineF, QPointF, QRectF, QSizeF, Qt
-from PySide6.QtGui import QColor, QFont, QPainter, QPen, QPolygonF
+from PySide6.QtGui import QColor, QFont, QImage, QPainter, QPen, QPolygonF
 
 from studio_core.session import View
-from studio_ui.canvas.overlay import Band, Dot, Face, Label, Overlay, Wires
+from studio_ui.canvas.overlay import Band, Dot, Face, Film, Label, Overlay, Ring, Wires
 from studio_ui.canvas.projection import project, project_segments
 from studio_ui.feed import Freshness
 from studio_ui.look.theme import Theme
@@ -29,6 +29,9 @@ def paint_overlay(painter: QPainter, size: QSizeF, view: View, overlay: Overlay,
     painter.setRenderHint(QPainter.RenderHint.Antialiasing)
     scale = (size.width(), size.height())
     for mark in overlay.marks:
+        if isinstance(mark, Film):
+            _film(painter, scale, mark)
+            continue
         tint = colour(mark.colour, theme)
         if isinstance(mark, Wires):
             _wires(painter, scale, view, mark, tint)
@@ -49,6 +52,12 @@ def paint_overlay(painter: QPainter, size: QSizeF, view: View, overlay: Overlay,
             spot = project(view, mark.at)[0] * scale + mark.offset
             if np.isfinite(spot).all():
                 _words(painter, QPointF(*spot), mark.text, tint)
+        elif isinstance(mark, Ring):
+            middle = QPointF(*np.multiply(mark.at, scale))
+            painter.setBrush(Qt.BrushStyle.NoBrush)
+            for pen in (QPen(_RIM, mark.width + 2), QPen(tint, mark.width)):
+                painter.setPen(pen)
+                painter.drawEllipse(middle, mark.radius, mark.radius)
         elif isinstance(mark, Band):
             box = QRectF(QPointF(*np.multiply(mark.start, scale)), QPointF(*np.multiply(mark.end, scale)))
             painter.setPen(QPen(tint, 1, Qt.PenStyle.SolidLine if mark.whole else Qt.PenStyle.DashLine))
@@ -99,6 +108,16 @@ def _wires(painter: QPainter, scale: tuple[float, float], view: View, mark: Wire
         painter.drawLines(lines)
     painter.setPen(QPen(tint, mark.width))
     painter.drawLines(lines)
+
+
+def _film(painter: QPainter, scale: tuple[float, float], mark: Film) -> None:
+    pixels = np.ascontiguousarray(mark.pixels)
+    height, width = pixels.shape[:2]
+    image = QImage(pixels.data, width, height, 4 * width, QImage.Format.Format_RGBA8888)
+    painter.setRenderHint(QPainter.RenderHint.SmoothPixmapTransform)
+    painter.drawImage(
+        QRectF(QPointF(*np.multiply(mark.start, scale)), QPointF(*np.multiply(mark.end, scale))), image
+    )
 
 
 def _words(painter: QPainter, at: QPointF, text: str, tint: QColor) -> None:

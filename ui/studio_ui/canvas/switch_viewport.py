@@ -144,6 +144,10 @@ class SwitchViewport(QWidget):
 
     # what every canvas answers
 
+    def placed(self) -> tuple[float, float, float, float]:
+        """Where the picture lies on the canvas."""
+        return self.inner.placed()
+
     def probe(self, x: float, y: float) -> Probe | None:
         """What the shown picture has at a point of the canvas."""
         return self.inner.probe(x, y)

@@ -8,6 +8,7 @@ accident.
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Protocol
 
 import numpy as np
 from PySide6.QtCore import Qt
@@ -34,11 +35,32 @@ from studio_ui.forms.number_style import number_style
 from studio_ui.objects.magnet import Magnet
 
 CLICK = 4.0  # logical pixels that a click may slip
-TOOLS = ("select", "move", "rotate", "scale")
+GIZMOS = ("move", "rotate", "scale")
+TOOLS = ("select", *GIZMOS, "stroke")
+
+
+class CanvasTool(Protocol):
+    """A tool of its own: it takes what it wants of the hand, the rest is as with the others."""
+
+    def pointer(self, pointer: Pointer) -> bool:
+        """The mouse did something; whether that was for this tool."""
+        ...
+
+    def wheel(self, pointer: Pointer, steps: float) -> bool:
+        """The wheel was turned; whether that was for this tool."""
+        ...
+
+    def marks(self) -> Overlay:
+        """What lies over the picture while it is used."""
+        ...
+
+    def leave(self) -> None:
+        """The mouse has left the picture, or another tool is used."""
+        ...
 
 
 class CanvasTools:
-    """Sits between a viewport, the session and the document."""
+    """Sits between a viewport, the session and the document. `own` are tools of their own, by name."""
 
     def __init__(
         self,
@@ -51,6 +73,7 @@ class CanvasTools:
         hint: Callable[[str], None] = lambda text: None,
     ) -> None:
         self.tool = "move"
+        self.own: dict[str, CanvasTool] = {}
         self.tool_changed: Signal[[str]] = Signal()
         self.looking = Looking(viewport, document, session, feed)
         self.holding = Holding(editing, session, hint)
@@ -62,7 +85,7 @@ class CanvasTools:
         self._mode = ""  # "", click, look, hold, band
         self._lit: Handle | None = None  # under the mouse, or pressed
         self._banding = False  # the next drag draws a band
-        self._grabs = False  # as the cursor shows
+        self._shape = Qt.CursorShape.ArrowCursor
         self._placed: tuple[object, Frame | None] | None = None
         viewport.want_keys(self._wants)
         self._off = [
@@ -87,10 +110,17 @@ class CanvasTools:
     def use(self, tool: str) -> None:
         """Choose a tool of `TOOLS`."""
         if tool != self.tool:
+            if self._other is not None:
+                self._other.leave()
             self.tool = tool
             self._lit = None
             self.tool_changed.emit(tool)
             self.refresh()
+
+    @property
+    def _other(self) -> CanvasTool | None:
+        """The tool in use, if it is one of its own."""
+        return self.own.get(self.tool)
 
     def band(self) -> None:
         """The next drag chooses what lies in a rectangle, whatever the tool."""
@@ -108,15 +138,16 @@ class CanvasTools:
             boxes = box_segments(*found)
         self._viewport.set_guides(view, glyphs(scene, view, chosen), boxes, self._overlay())
         grabs = self._lit is not None or self.holding.active
-        if grabs != self._grabs:
-            self._grabs = grabs
-            shape = Qt.CursorShape.PointingHandCursor if grabs else Qt.CursorShape.ArrowCursor
+        shape = Qt.CursorShape.CrossCursor if self._other is not None else Qt.CursorShape.ArrowCursor
+        shape = Qt.CursorShape.PointingHandCursor if grabs else shape
+        if shape is not self._shape:
+            self._shape = shape
             self._viewport.widget.setCursor(shape)
 
     def gizmo(self) -> Gizmo | None:
         """The handles of the tool in use, on what is chosen."""
         frame = self.holding.frame or self._frame()
-        if self.tool == "select" or frame is None:
+        if self.tool not in GIZMOS or frame is None:
             return None
         return Gizmo(self.tool, frame, self._session.view, self._size())
 
@@ -148,8 +179,11 @@ class CanvasTools:
 
     def _on_pointer(self, pointer: Pointer) -> None:
         self._last = pointer
+        other = self._other if self._press is None and not self._banding else None
         if self.holding.keyed:
             self._follow_without_button(pointer)
+        elif other is not None and other.pointer(pointer):
+            self.refresh()
         elif pointer.kind == "press":
             self._pressed(pointer)
         elif pointer.kind == "double":
@@ -277,10 +311,15 @@ class CanvasTools:
         self.refresh()
 
     def _on_wheel(self, pointer: Pointer, steps: float) -> None:
-        if not self.holding.active:
+        if self._other is not None and self._other.wheel(pointer, steps):
+            self.refresh()
+        elif not self.holding.active:
             self.looking.wheel(pointer, steps)
 
     def _on_left(self) -> None:
+        if self._other is not None:
+            self._other.leave()
+            self.refresh()
         if self._lit is not None and self._press is None:
             self._lit = None
             self.refresh()
@@ -304,7 +343,7 @@ class CanvasTools:
 
     def _key_axis(self, key: str) -> None:
         """An axis key: from now on the mouse, or what is typed, moves what is chosen along it."""
-        hold = self._hold(self._last) if self.tool != "select" else None
+        hold = self._hold(self._last) if self.tool in GIZMOS else None
         if hold is None:
             return
         kinds: dict[str, Kind] = {"move": "axis", "rotate": "ring", "scale": "size"}
@@ -330,6 +369,8 @@ class CanvasTools:
         if self._mode == "band" and self._press is not None:
             start, end = (self._press.x, self._press.y), (self._last.x, self._last.y)
             return Overlay((Band(start, end, whole=end[0] >= start[0]),))
+        if self._other is not None:
+            return self._other.marks()
         gizmo = self.gizmo()
         if self.holding.active:
             return self.holding.marks(gizmo)

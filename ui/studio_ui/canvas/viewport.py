@@ -119,6 +119,10 @@ class Viewport(Protocol):
         """Colours around and over the picture."""
         ...
 
+    def placed(self) -> tuple[float, float, float, float]:
+        """Where the picture lies on the canvas: left, top, right, bottom, 0…1 from the top left."""
+        ...
+
     def probe(self, x: float, y: float) -> Probe | None:
         """What the shown picture has at a point of the canvas; None outside or without a picture."""
         ...

@@ -16,6 +16,7 @@ from studio_ui.canvas import navigation
 from studio_ui.canvas.drags import middle, named
 from studio_ui.canvas.tools import TOOLS, CanvasTools
 from studio_ui.context import Context
+from studio_ui.panels.node_kinds import LISTED_APART
 
 STEP = 0.05  # metres
 ANGLE = 15.0  # degrees
@@ -88,7 +89,7 @@ class Commands:
     def select_all(self) -> None:
         """Everything at the top that is shown and not locked."""
         scene = self._context.document.scene
-        tops = scene.children(None)
+        tops = [node for node in scene.children(None) if not isinstance(node, LISTED_APART)]
         self._context.session.select(n.id for n in tops if not n.locked and not n.hidden)
 
     def nudge(self, right: int, up: int, away: int) -> None:
@@ -133,9 +134,10 @@ class Commands:
         self._fields("Hide", self.chosen, "hidden", True)
 
     def show_all(self) -> None:
-        """Show everything that is hidden, but switch no lamp on."""
+        """Show everything that is hidden, but switch no lamp on and no stroke."""
         scene = self._context.document.scene
-        hidden = [n.id for n in scene.nodes.values() if n.hidden and not hasattr(n, "intensity")]
+        there = (node for node in scene.nodes.values() if not isinstance(node, LISTED_APART))
+        hidden = [node.id for node in there if node.hidden and not hasattr(node, "intensity")]
         self._fields("Show all", tuple(hidden), "hidden", False)
 
     def lock(self) -> None:

@@ -11,7 +11,7 @@ from studio_ui.context import Context
 from studio_ui.objects.choosing import meshes_below
 from studio_ui.objects.material_drag import assigned
 from studio_ui.palette.palette import Entry
-from studio_ui.panels.node_kinds import kind_name
+from studio_ui.panels.node_kinds import LISTED_APART, kind_name
 
 _MOST = 300
 """Of things and of materials each: in scenes of more, the outliner finds what is looked for."""
@@ -22,7 +22,8 @@ _AFTER = -6.0
 def scene_entries(context: Context) -> Iterator[Entry]:
     """Things from the top of the scene down, then materials."""
     scene, session = context.document.scene, context.session
-    for node in islice(scene.nodes.values(), _MOST):
+    things = (node for node in scene.nodes.values() if not isinstance(node, LISTED_APART))
+    for node in islice(things, _MOST):
         run = partial(session.select, [node.id])
         place = f"Choose ▸ {kind_name(node)}"
         yield Entry(f"choose.{node.id}", node.name, place, run, rank=_AFTER, kept=False)

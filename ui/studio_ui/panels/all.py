@@ -26,6 +26,7 @@ from studio_ui.panels.properties import PropertiesPanel
 from studio_ui.panels.shading import ShadingPanel
 from studio_ui.plugins.panel import plugin_panels
 from studio_ui.settings import Settings
+from studio_ui.strokes.panel import StrokePanel
 from studio_ui.views.camera_pictures import CameraPictures
 from studio_ui.views.cameras import Cameras
 
@@ -40,6 +41,7 @@ def all_panels(
     cameras: Cameras,
     pictures: CameraPictures,
     capture: CapturePanel,
+    strokes: StrokePanel,
     library: MaterialLibrary,
     taking: Taking,
     open_library: Callable[[], object],
@@ -63,6 +65,7 @@ def all_panels(
         (LightingPanel(context, shelf, load_environment, ask.folder), right),
         (ShadingPanel(context), right),
         (ConsolePanel(context, ask, settings, save), below),
+        (strokes, right),
         (capture, right),
         *((panel, right) for panel in plugin_panels(context)),
     ]

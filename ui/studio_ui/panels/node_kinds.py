@@ -16,6 +16,7 @@ from studio_core.scene.nodes import (
     SpotLamp,
 )
 from studio_core.scene.room import Room
+from studio_core.strokes.stroke import Stroke
 
 KINDS: dict[type[Node], tuple[str, str, str]] = {
     Group: ("group", "Group", "groups"),
@@ -24,6 +25,7 @@ KINDS: dict[type[Node], tuple[str, str, str]] = {
     Camera: ("camera", "Camera", "cameras"),
     Environment: ("environment", "Environment", "environments"),
     Capture: ("capture", "Capture", "captures"),
+    Stroke: ("stroke", "Stroke", "strokes"),
     PointLamp: ("lamp", "Point lamp", "point lamps"),
     SpotLamp: ("spot", "Spot lamp", "spot lamps"),
     DirectionalLamp: ("sun", "Sun", "suns"),
@@ -32,6 +34,9 @@ KINDS: dict[type[Node], tuple[str, str, str]] = {
     Node: ("object", "Object", "objects"),
 }
 """Icon, name and plural of a kind; a class that is not here has those of the nearest it derives from."""
+
+LISTED_APART = (Stroke,)
+"""Kinds that have a list in a panel of their own: neither the outliner nor the palette shows them."""
 
 FILTERS: dict[str, tuple[str, type[Node]]] = {
     "": ("Everything", Node),

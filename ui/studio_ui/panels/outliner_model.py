@@ -16,7 +16,7 @@ from studio_ui.editing import Editing
 from studio_ui.look.icons import icon
 from studio_ui.look.theme import DARK, Theme
 from studio_ui.objects.material_drag import LIBRARY_MIME, MIME, assigned, dragged_entry, dragged_material
-from studio_ui.panels.node_kinds import kind_icon, kind_name
+from studio_ui.panels.node_kinds import LISTED_APART, kind_icon, kind_name
 
 Index = QModelIndex | QPersistentModelIndex
 NAME, EYE, LOCK = range(3)
@@ -58,11 +58,13 @@ class OutlinerModel(QAbstractItemModel):
         """Take over another scene; True when rows came, went or moved."""
         before, self._scene = self._scene, after
         same = tuple(before.nodes) == tuple(after.nodes) and all(
-            self._parent[n] == after.nodes[n].parent for n in changes.nodes if n in after.nodes
+            self._parent.get(n, after.nodes[n].parent) == after.nodes[n].parent
+            for n in changes.nodes
+            if n in after.nodes
         )
         if not same:
             self._restructure(_tree(after))
-        self._tell_cells(n for n in changes.of(Aspect.NAME | Aspect.STRUCTURE) if n in after.nodes)
+        self._tell_cells(n for n in changes.of(Aspect.NAME | Aspect.STRUCTURE) if n in self._parent)
         return not same
 
     def _restructure(self, wanted: dict[NodeId | None, list[NodeId]]) -> None:
@@ -323,8 +325,10 @@ class OutlinerModel(QAbstractItemModel):
 
 
 def _tree(scene: Scene) -> dict[NodeId | None, list[NodeId]]:
-    """Children by parent, in the scene's order."""
+    """Children by parent, in the scene's order; kinds that are listed elsewhere are left out."""
     made: dict[NodeId | None, list[NodeId]] = {None: []}
     for node in scene.nodes.values():
+        if isinstance(node, LISTED_APART):
+            continue
         made.setdefault(node.parent, []).append(node.id)
     return made

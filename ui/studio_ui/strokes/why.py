@@ -1,0 +1,168 @@
+"""Why: what a stroke was found to mean, how well that explains it, and what else it could mean."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from functools import partial
+
+import numpy as np
+from PySide6.QtCore import QSize, Qt
+from PySide6.QtGui import QIcon, QImage, QPixmap
+from PySide6.QtWidgets import QGridLayout, QLabel, QToolButton, QVBoxLayout, QWidget
+
+from studio_core.errors import EditError, PluginError
+from studio_core.kernels.tonemap import tonemap
+from studio_core.params import defaults, param_infos
+from studio_core.registry import PluginHost
+from studio_core.scene.nodes import MeshObject, Scene
+from studio_core.shading.artifacts import Picture
+from studio_core.strokes.solution import Finding, Reason, Solution
+from studio_core.strokes.stroke import AUTOMATIC, Stroke
+from studio_ui.look.role import set_role
+from studio_ui.look.theme import GAP
+from studio_ui.panels.panel import clear, note
+from studio_ui.strokes.sketches import HEIGHT, WIDTH, Sketches
+from studio_ui.strokes.words import changed, explained, sentence, silence
+
+_CARDS = 4
+"""Reasons that are shown as pictures, the chosen one among them."""
+_COLUMNS = 2
+
+
+class Why(QWidget):
+    """`taken(finding, reason)` when somebody wants another reason."""
+
+    def __init__(self, host: PluginHost, sketches: Sketches) -> None:
+        super().__init__()
+        self.taken: Callable[[Finding, Reason], object] = lambda finding, reason: None
+        self.told = _line("")
+        self.lines: list[QLabel] = []
+        self.cards: list[QToolButton] = []
+        self._host, self._sketches = host, sketches
+        column = QVBoxLayout(self)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.setSpacing(GAP)
+        column.addWidget(self.told)
+        self._rest = QVBoxLayout()
+        self._rest.setSpacing(GAP)
+        column.addLayout(self._rest)
+
+    def say(self, text: str, *, problem: bool = False) -> None:
+        """A sentence instead of findings."""
+        self._empty()
+        self.told.setText(text)
+        set_role(self.told, "problem" if problem else "dim")
+
+    def show_findings(
+        self, scene: Scene, stroke: Stroke, findings: tuple[Finding, ...], solution: Solution
+    ) -> None:
+        """What a stroke of a scene was found to mean."""
+        self._empty()
+        self.told.setVisible(not findings)
+        self.told.setText("" if solution.notes else "Nothing was found to change.")
+        for finding in findings:
+            chosen = chosen_reason(stroke, finding)
+            line = _line(sentence(scene, finding, chosen, self._change(scene, finding, chosen)))
+            self.lines.append(line)
+            self._rest.addWidget(line)
+            if chosen.meaning:
+                self._add_cards(scene, stroke, finding)
+            silent = silence(finding)
+            if silent:
+                self._rest.addWidget(note(silent))
+            if finding.close:
+                others = "One other reason is" if finding.close == 1 else f"{finding.close} other reasons are"
+                self._rest.addWidget(note(f"{others} nearly as good"))
+        for text in solution.notes:
+            self._rest.addWidget(note(text))
+
+    def _empty(self) -> None:
+        self._sketches.forget()
+        self.cards, self.lines = [], []
+        self.told.show()
+        while self._rest.count():
+            item = self._rest.takeAt(0)
+            layout, widget = (item.layout(), item.widget()) if item is not None else (None, None)
+            if isinstance(layout, QGridLayout):
+                clear(layout)  # type: ignore[arg-type]
+            if widget is not None:
+                widget.hide()
+                widget.deleteLater()
+
+    def _add_cards(self, scene: Scene, stroke: Stroke, finding: Finding) -> None:
+        if len(finding.reasons) < 2:
+            return
+        grid = QGridLayout()
+        grid.setSpacing(GAP)
+        self._rest.addLayout(grid)
+        current = chosen_reason(stroke, finding)
+        for number, reason in enumerate(finding.reasons[:_CARDS]):
+            card = self._card(scene, finding, reason, chosen=reason is current)
+            grid.addWidget(card, number // _COLUMNS, number % _COLUMNS)
+            self.cards.append(card)
+            self._sketches.want(scene, stroke.id, reason, partial(self._drawn, card))
+
+    def _card(self, scene: Scene, finding: Finding, reason: Reason, *, chosen: bool) -> QToolButton:
+        card = QToolButton()
+        card.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextUnderIcon)
+        card.setIconSize(QSize(WIDTH, HEIGHT))
+        card.setCheckable(True)
+        card.setChecked(chosen)
+        blank = QPixmap(WIDTH, HEIGHT)
+        blank.fill(Qt.GlobalColor.transparent)
+        card.setIcon(QIcon(blank))
+        name = reason.meaning or "no change"
+        share = 100 * min(max(reason.explained, 0.0), 1.0)
+        card.setText(f"{name}  {share:.0f} %")
+        change = self._change(scene, finding, reason)
+        tip = f"{change}\n{explained(reason)}" if change else explained(reason)
+        card.setToolTip(f"{tip}\nThis is it now" if chosen else f"{tip}\nClick to take it instead")
+        card.setAccessibleName(f"Explain by {name}")
+        card.clicked.connect(lambda: card.setChecked(chosen) if chosen else self.taken(finding, reason))
+        return card
+
+    def _drawn(self, card: QToolButton, picture: Picture) -> None:
+        if card not in self.cards:
+            return
+        session = self._sketches.session
+        pixels = np.ascontiguousarray(tonemap(picture.linear, session.exposure, session.tonemap))
+        height, width = pixels.shape[:2]
+        image = QImage(pixels.data, width, height, 3 * width, QImage.Format.Format_RGB888)
+        card.setIcon(QIcon(QPixmap.fromImage(image.copy())))
+
+    def _change(self, scene: Scene, finding: Finding, reason: Reason) -> str:
+        """Which parameters differ, in the words of the material's own form."""
+        try:
+            after = reason.edit(scene)
+            node = after.nodes[finding.node]
+            if not isinstance(node, MeshObject):
+                return ""
+            material = after.material(node.materials[finding.slot])
+            params = self._host.brdf(material.model).Params
+        except (EditError, PluginError, KeyError, IndexError):
+            return ""
+        before: Mapping[str, object] = {**defaults(params), **material.values}
+        labels = {name: info.label for name, info in param_infos(params).items()}
+        return changed(before, labels, reason)
+
+
+def _line(text: str) -> QLabel:
+    made = QLabel(text)
+    made.setWordWrap(True)
+    made.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
+    return made
+
+
+def chosen_reason(stroke: Stroke, finding: Finding) -> Reason:
+    """The one that the stroke means now: what was taken, or the best."""
+    return next(
+        (
+            reason
+            for reason in finding.reasons
+            if stroke.meaning not in ("", AUTOMATIC, None) and reason.meaning == stroke.meaning
+        ),
+        finding.reasons[0],
+    )
+
+
+__all__ = ["Why", "chosen_reason"]
