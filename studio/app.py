@@ -59,6 +59,7 @@ class PluginShading:
 
     def __init__(self, services: Services) -> None:
         self._services = services
+        self._unrefined: Any = None
         self._meter: Any = None  # keeps textures' tables; made on the compute thread, it loads kernels
 
     def pipeline(self, backend: str) -> Pipeline:
@@ -80,9 +81,12 @@ class PluginShading:
 
     def lit(self, pipeline: Pipeline, scene: Scene) -> Lit | None:
         """What the pipeline's newest frame has for solvers of strokes."""
+        from studio_core.shading.indirect import UnrefinedShapes
         from studio_core.strokes.lit import lit_of
 
-        return lit_of(pipeline, scene)
+        self._unrefined = self._unrefined or UnrefinedShapes(self._services)
+        found: Lit | None = lit_of(pipeline, scene, self._unrefined)
+        return found
 
     def params(self, backend: str, values: Mapping[str, Any]) -> Any:
         """The backend's parameters, checked."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from studio_core.scene.diff import Aspect, diff
 from studio_core.scene.nodes import Scene
 from studio_core.shading.artifacts import Casters, Hits, Indirect, Lighting, Shapes, Surfaces
+from studio_core.shading.indirect import UnrefinedShapes
 from studio_core.shading.pipeline import Pipeline
 from studio_core.strokes.solution import Lit
 
@@ -12,8 +13,11 @@ _HARMLESS = Aspect.NAME | Aspect.MATERIAL | Aspect.STROKES
 """What may differ between the scene that was lit and the one that strokes are solved in."""
 
 
-def lit_of(pipeline: Pipeline, scene: Scene) -> Lit | None:
-    """For strokes on `scene`; None where the pipeline has not come to it, or makes no such artifacts."""
+def lit_of(pipeline: Pipeline, scene: Scene, unrefined: UnrefinedShapes) -> Lit | None:
+    """For strokes on `scene`; None where the pipeline has not come to it, or makes no such artifacts.
+
+    `scene` may have other paint and materials than the picture; shapes are those of the picture's.
+    """
     frame = pipeline.frame
     if frame is None or diff(frame.scene, scene).aspects & ~_HARMLESS:
         return None
@@ -24,6 +28,7 @@ def lit_of(pipeline: Pipeline, scene: Scene) -> Lit | None:
     indirect = pipeline.artifact(Indirect) if frame.bounced is not None else None
     if indirect is not None and indirect.surfaces is not surfaces.unrefined:
         indirect = None
+    shapes = unrefined(frame.scene, surfaces, shapes)
     return Lit(surfaces, casters, shapes, lighting, pipeline.settled(Hits), indirect)
 
 

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from painting_support import PLUGIN, Rule, lit_room, studio_of
 from PySide6.QtCore import QPoint, Qt
 from pytestqt.qtbot import QtBot
-from painting_support import PLUGIN, Rule, lit_room, studio_of
 from ui_support import Driver
 
 from studio_core.errors import InputError

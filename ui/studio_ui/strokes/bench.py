@@ -9,8 +9,9 @@ from typing import Any
 from studio_core.contract import Services, StrokeRun
 from studio_core.edits import Compound, Edit, SetPaint
 from studio_core.errors import InputError, PluginError
-from studio_core.scene.nodes import MeshObject, NodeId, Scene
+from studio_core.scene.nodes import NodeId, Scene
 from studio_core.shading.job import Job
+from studio_core.strokes.edits import bared, concerned
 from studio_core.strokes.solution import Lit, Solution
 from studio_core.strokes.stroke import Stroke
 
@@ -26,6 +27,11 @@ class Order:
     make: Callable[[], Edit | None]
     concerned: NodeId | None = None
     """The stroke that is new or other than before."""
+
+    def strokes(self, start: Scene, scene: Scene) -> list[Stroke]:
+        """What it was before, and is after the order: both tell on what it lies."""
+        there = (where.nodes.get(self.concerned or "") for where in (start, scene))
+        return [stroke for stroke in there if isinstance(stroke, Stroke)]
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,7 +65,7 @@ class Bench:
         if bare:
             edit = Compound(order.label, (edit, *(SetPaint(node, None) for node in bare)))
             scene = edit(start)
-        strokes = concerned(start, scene, order.concerned)
+        strokes = concerned(scene, order.strokes(start, scene))
         solution = NOTHING
         if any(not scene[stroke].hidden for stroke in strokes):
             run, params = self._run(solver)
@@ -82,48 +88,6 @@ class Bench:
         return self._runs[name]
 
 
-def concerned(start: Scene, scene: Scene, changed: NodeId | None) -> tuple[NodeId, ...]:
-    """The strokes that must be solved together with one that has changed: those on the same objects.
-
-    And so on from each of these; where one of them changes what is reflected, all that do so, and what must
-    stay as it is. Without `changed`, all strokes.
-    """
-    strokes = {stroke.id: stroke for stroke in scene.of(Stroke)}
-    if changed is None:
-        return tuple(strokes)
-    first = [there.nodes[changed] for there in (start, scene) if changed in there.nodes]
-    met = [stroke for stroke in first if isinstance(stroke, Stroke)]
-    found: dict[NodeId, Stroke] = {}
-    objects = {node for stroke in met for node in stroke.objects}
-    indirect = any(stroke.indirect for stroke in met)
-    while True:
-        more = {
-            node: stroke
-            for node, stroke in strokes.items()
-            if node not in found
-            and (not objects.isdisjoint(stroke.objects) or (indirect and _reaches_far(stroke)))
-        }
-        if not more:
-            return tuple(node for node in strokes if node in found)
-        found |= more
-        objects |= {node for stroke in more.values() for node in stroke.objects}
-        indirect = indirect or any(stroke.indirect for stroke in more.values())
-
-
-def _reaches_far(stroke: Stroke) -> bool:
-    return stroke.indirect or stroke.tool == "fixate"
-
-
-def bared(start: Scene, scene: Scene) -> tuple[NodeId, ...]:
-    """Painted objects whose last stroke went between two scenes."""
-
-    def covered(there: Scene) -> set[NodeId]:
-        return {node for stroke in there.of(Stroke) if not stroke.hidden for node in stroke.objects}
-
-    lost = covered(start) - covered(scene)
-    return tuple(node.id for node in scene.of(MeshObject) if node.id in lost and node.paint is not None)
-
-
 def lit_for(pipeline: Any, scene: Scene, kept: dict[str, Lit]) -> Lit | None:
     """What the newest picture has for `scene`, looked up once for all that `kept` is for."""
     if "lit" not in kept:
@@ -136,4 +100,4 @@ def lit_for(pipeline: Any, scene: Scene, kept: dict[str, Lit]) -> Lit | None:
 
 NOT_YET = InputError("There is no picture yet that could be painted on.")
 
-__all__ = ["NOTHING", "NOT_YET", "SOLVER", "Answer", "Bench", "Order", "bared", "concerned", "lit_for"]
+__all__ = ["NOTHING", "NOT_YET", "SOLVER", "Answer", "Bench", "Order", "lit_for"]

@@ -48,7 +48,7 @@ _HANDS = (
     (False, "This surface", "The surface itself gets the material that looks as painted"),
     (True, "What it shows", "The surface stays; what lights it or is reflected in it changes"),
 )
-_STROKE = ("weight", "meaning", *REACH)
+_STROKE = ("weight", "meaning", "together", *REACH)
 
 
 class StrokeControls(QWidget):
