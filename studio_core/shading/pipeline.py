@@ -147,10 +147,20 @@ class Pipeline:
 
     def settled(self, kind: type[A]) -> A | None:
         """What `artifact` gives where it belongs to `frame`: cancelled work has not left it behind."""
-        return self.artifact(kind) if self._is_settled(kind) else None
+        return self.artifact(kind) if self.is_settled(kind) else None
 
-    def _is_settled(self, kind: type) -> bool:
-        """Whether the stage that gives it would not run again, but to refine, nor one that it needs."""
+    def pending(self, kind: type) -> Aspect:
+        """What has changed since the stage that gives `kind` last ran."""
+        for stage, record in zip(self.stages, self._records or (), strict=False):
+            if stage.gives is kind:
+                return record.pending.aspects
+        return Aspect.NONE
+
+    def is_settled(self, kind: type) -> bool:
+        """Whether the stage that gives it would not run again, but to refine, nor one that it needs.
+
+        What no stage gives is as settled as it gets.
+        """
         if kind in self._handed:
             return True
         stamps = {stage.gives: r.stamp for stage, r in zip(self.stages, self._records or (), strict=False)}
@@ -159,9 +169,9 @@ class Pipeline:
                 fresh = record.stamp > 0 and not stage.dirtied_by & record.pending.aspects
                 own = (need for need in stage.needs if need not in self._handed)
                 return fresh and all(
-                    record.seen.get(need) == stamps[need] and self._is_settled(need) for need in own
+                    record.seen.get(need) == stamps[need] and self.is_settled(need) for need in own
                 )
-        return False
+        return all(stage.gives is not kind for stage in self.stages)
 
     def mark(self, frame: Frame, changes: Changes) -> None:
         """Remember what changed for every stage."""

@@ -106,10 +106,11 @@ def _tell_cancelled(question: _Question) -> None:
 
 @dataclass(frozen=True)
 class _Question:
-    """Work on what the pipeline has made, and who is told of its result or its error."""
+    """Work on what the pipeline has made, who is told of its result or its error, and when it can begin."""
 
     work: Callable[[Pipeline, Job], Any]
     done: Callable[[Any, Exception | None], None]
+    ready: Callable[[Pipeline], bool]
     job: Job
 
 
@@ -135,7 +136,7 @@ class Scheduler:
     either.
 
     Questions (`ask`) are answered between frames, in turn with them. Spare work and further rounds of a frame
-    at rest make way for them, and go on afterwards.
+    at rest make way for them, and go on afterwards; so does its first round for a question that is `ready`.
     """
 
     def __init__(
@@ -203,11 +204,16 @@ class Scheduler:
         return self._revision
 
     def ask(
-        self, name: str, work: Callable[[Pipeline, Job], Any], done: Callable[[Any, Exception | None], None]
+        self,
+        name: str,
+        work: Callable[[Pipeline, Job], Any],
+        done: Callable[[Any, Exception | None], None],
+        ready: Callable[[Pipeline], bool] = lambda pipeline: False,
     ) -> Job:
         """Do `work(pipeline, job)` on the executor between frames; then `done(result, error)` here.
 
-        A newer question of the same name cancels an older one, which is then told Cancelled.
+        A newer question of the same name cancels an older one, which is then told Cancelled. `ready`, asked
+        on the executor, tells of a frame under way whether enough of it is made.
         """
         job = Job(name, on_progress=lambda j: self._post(lambda: self.progress.emit(j)))
         asked = self._questions.pop(name, None)
@@ -215,7 +221,7 @@ class Scheduler:
             _tell_cancelled(asked)
         elif self._asked is not None and self._asked[0] == name:
             self._asked[1].job.cancel()
-        question = self._questions[name] = _Question(work, done, job)
+        question = self._questions[name] = _Question(work, done, ready, job)
         if self._closed:
             del self._questions[name]
             _tell_cancelled(question)
@@ -275,6 +281,14 @@ class Scheduler:
         if self._asked is not None:
             self._asked[1].job.cancel()
 
+    def _checkpoint(self, frame: Frame, job: Job) -> None:
+        """On the executor: the first round of a frame at rest makes way as soon as a question is ready."""
+        asked = () if frame.moving or self.pipeline.rounds else tuple(self._questions.values())
+        if any(question.ready(self.pipeline) for question in asked):
+            self._makes_way = True
+            job.cancel()
+        self._post(lambda: self._progressed(job))
+
     def _progressed(self, job: Job) -> None:
         self.progress.emit(job)
         if job is self._job:
@@ -286,7 +300,7 @@ class Scheduler:
         self._frames_turn = False
         job = Job(
             self.label,
-            on_progress=lambda j: self._post(lambda: self._progressed(j)),
+            on_progress=lambda j: self._checkpoint(frame, j),
             on_publish=lambda artifact: self._post(lambda: self._show(frame, artifact, False)),
         )
         self._job = job

@@ -28,6 +28,9 @@ def lit_of(pipeline: Pipeline, scene: Scene, unrefined: UnrefinedShapes) -> Lit 
     indirect = pipeline.artifact(Indirect) if frame.bounced is not None else None
     if indirect is not None and indirect.surfaces is not surfaces.unrefined:
         indirect = None
+    late = indirect is None or pipeline.pending(Indirect) & ~_HARMLESS
+    if frame.bounced is not None and late and not pipeline.is_settled(Indirect):
+        return None
     shapes = unrefined(frame.scene, surfaces, shapes)
     return Lit(surfaces, casters, shapes, lighting, pipeline.settled(Hits), indirect)
 

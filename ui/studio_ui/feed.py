@@ -156,12 +156,19 @@ class PictureFeed:
         """Ask for everything again."""
         self.want(everything(self._document.scene))
 
-    def ask(self, name: str, work: Answering, done: Callable[[Any, Exception | None], None]) -> Job:
+    def ask(
+        self, name: str, scene: Scene, work: Answering, done: Callable[[Any, Exception | None], None]
+    ) -> Job:
         """Do `work(pipeline, job)` on the compute thread between pictures; then `done(result, error)` here.
 
-        The newest of a name wins; the others are told Cancelled.
+        The newest of a name wins; the others are told Cancelled. A picture at rest makes way as soon as it
+        has what solvers of strokes on `scene` need.
         """
-        return self._scheduler.ask(name, work, done)
+
+        def ready(pipeline: Any) -> bool:
+            return pipeline.lit(scene) is not None
+
+        return self._scheduler.ask(name, work, done, ready)
 
     def another(self) -> LazyPipeline:
         """A pipeline beside the picture's, with the session's backend; for the compute thread."""

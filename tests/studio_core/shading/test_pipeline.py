@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable
+from contextlib import suppress
 from random import Random
 from typing import Any
 
@@ -450,3 +451,32 @@ def test_scenes_of_these_tests_differ_where_pictures_do() -> None:
         from_scratch(edits.SetFields("sky", {"intensity": 3.0})(scene), View()),
     ]
     assert all(a != b for i, a in enumerate(pictures) for b in pictures[:i])
+
+
+@settings(max_examples=60)
+@given(st.integers(0, 2**32), st.lists(st.integers(1, 14), max_size=4))
+def test_what_is_settled_is_what_another_pipeline_would_make(seed: int, stops: list[int]) -> None:
+    bench, random = Bench(), Random(seed)
+    bench.update(NOTHING)
+    for serial, stop in enumerate(stops):
+        try:
+            changes = bench.edit(random_edit(random, bench.scene, serial))
+        except EditError:
+            continue
+        with suppress(Cancelled):
+            bench.update(changes, StoppingJob(stop))
+    fresh = Bench()
+    fresh.scene = bench.scene
+    fresh.update(NOTHING)
+    assert bench.pipeline.frame is not None
+    assert bench.pipeline.frame.scene is bench.scene or not stops
+    for stage in bench.stages:
+        found = bench.pipeline.settled(stage.gives)
+        assert found is None or found == fresh.pipeline.artifact(stage.gives), stage.gives
+    bench.update(NOTHING)
+    assert all(bench.pipeline.settled(stage.gives) is not None for stage in bench.stages)
+
+
+def test_nothing_is_settled_before_it_was_made() -> None:
+    assert Bench().pipeline.settled(Picture) is None
+    assert Bench().pipeline.settled(Scene) is None

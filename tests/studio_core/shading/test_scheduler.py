@@ -15,7 +15,15 @@ from random import Random
 from typing import Any
 
 import pytest
-from counting_stages import DetailStage, Picture, Stage, counting_stages, from_scratch, refining_stages
+from counting_stages import (
+    DetailStage,
+    Picture,
+    Places,
+    Stage,
+    counting_stages,
+    from_scratch,
+    refining_stages,
+)
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from random_edits import random_edit
@@ -23,7 +31,7 @@ from scenes import little_scene
 
 from studio_core import edits
 from studio_core.errors import Cancelled, EditError
-from studio_core.scene.diff import Changes, diff, view_changed
+from studio_core.scene.diff import Changes, diff, everything, view_changed
 from studio_core.scene.nodes import Scene
 from studio_core.scene.transform import Transform
 from studio_core.session import View
@@ -689,3 +697,28 @@ def test_who_asks_a_closed_scheduler_is_told_so(bench: Bench) -> None:
     bench.scheduler.ask("where", picture_of, late)
     bench.executor.drain()
     assert waiting.results == late.results == [Cancelled]
+
+
+@pytest.mark.parametrize(("moving", "waits"), [(False, False), (True, True)])
+def test_the_first_round_at_rest_makes_way_as_soon_as_enough_is_made(
+    bench: Bench, moving: bool, waits: bool
+) -> None:
+    order: list[str] = []
+    bench.scheduler.shown.connect(lambda frame, artifact, final: order.append("frame"))
+
+    def ready(pipeline: Pipeline) -> bool:
+        return pipeline.settled(Places) is not None
+
+    def ask() -> None:
+        bench.scheduler.ask(
+            "why", lambda p, job: p.settled(Places), lambda *told: order.append("answer"), ready
+        )
+
+    bench.once(PLACES, ask)
+    bench.scene = edits.Compound("Both", (move(1.0), tint(0.2)))(bench.scene)
+    changes = everything(bench.scene)
+    bench.scheduler.request(Frame(bench.scene, bench.view, None, moving=moving), changes)
+    bench.executor.drain()
+    assert order == (["frame", "answer"] if waits else ["answer", "frame"])
+    assert bench.shown[-1] == (2, bench.truth(), True)
+    assert bench.runs()[PLACES] == 1, "what was made before the answer is not made again"

@@ -113,7 +113,7 @@ class Likeness(QObject):
             if self._again:
                 self._ask()
 
-        self._context.feed.ask("likeness", work, done)
+        self._context.feed.ask("likeness", scene, work, done)
 
 
 def spread(amount: F32, surfaces: Surfaces, hits: Hits) -> F32:

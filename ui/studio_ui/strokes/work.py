@@ -197,7 +197,7 @@ class StrokeWork(QObject):
             else:
                 self._answered(asked, result[1], last)
 
-        self._job = self._context.feed.ask("strokes", work, done)
+        self._job = self._context.feed.ask("strokes", start, work, done)
         self.moved.emit()
 
     def _wait(self) -> None:
