@@ -23,6 +23,7 @@ from studio_core.shading.job import Job
 from studio_core.strokes.solution import Finding, Lit, Reason, Solution
 from studio_core.strokes.stroke import AUTOMATIC, COLOUR, GLOSS, Stroke
 from studio_plugins.brdfs import plugin as brdfs
+from studio_plugins.export import plugin as export
 from studio_plugins.meshes import plugin as meshes
 from studio_plugins.reference import plugin as reference
 from studio_ui.settings import Settings
@@ -115,7 +116,7 @@ def lit_room() -> Scene:
 
 def studio_of(folder: Path, bot: QtBot, *plugins: Plugin) -> Driver:
     """A window over the real core with the quickest backend, and no solver but those given."""
-    host = PluginHost([brdfs, reference, meshes, *plugins])
+    host = PluginHost([brdfs, reference, meshes, export, *plugins])
     answers = Answers()
     settings = Settings(folder)
     settings.set("animate_view", False)

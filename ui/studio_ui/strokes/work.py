@@ -129,7 +129,7 @@ class StrokeWork(QObject):
         """Another reason than the first."""
         scene = self._context.document.scene
         name = scene[finding.node].name if finding.node in scene.nodes else "it"
-        label = f"{reason.meaning.capitalize() or 'Nothing'} of {name}"
+        label = f"{reason.meaning.capitalize()} of {name}" if reason.meaning else f"Leave {name} as it is"
         self._context.editing.apply(Compound(label, (reason.edit,)))
 
     def explain(self, stroke: NodeId) -> None:
