@@ -22,6 +22,7 @@ from studio_core.document import Document
 from studio_core.edits import Add, SetFields
 from studio_core.scene.geometry import Image
 from studio_core.scene.nodes import Environment
+from studio_core.strokes.stroke import Stroke
 from studio_ui.actions.catalogue import ACTIONS, specs
 from studio_ui.dialogs import KeysDialog
 from studio_ui.feed import REST_MS
@@ -207,6 +208,16 @@ def test_only_turning_the_light_ticks_off_the_hint_of_it(driver: Driver) -> None
     assert not ticked()
     document.apply(SetFields("sky", {"azimuth": 30.0}))
     assert ticked()
+
+
+def test_the_last_hint_leads_to_strokes(driver: Driver) -> None:
+    label = driver.window.hints._labels[2]
+    assert "P" in label.text()
+    driver.do("tool.stroke")
+    assert driver.window.panels["strokes"].isVisible()
+    assert not label.text().startswith("✓")
+    driver.document.apply(Add((Stroke(id="s", name="Colour on Stool"),)))
+    assert label.text().startswith("✓")
 
 
 def test_hints_are_ticked_off_and_never_come_again(make: Make, tmp_path: Path) -> None:
