@@ -6,6 +6,7 @@ surface                                            model
 metallic-roughness, index up to 1.79               ggx, exactly
 no reflection at all                               lambert; oren-nayar where the matte part is rough
 cloth: no metal, dull, under a sheen               cloth
+dielectric with a coloured reflection              specgloss, exactly where all that grazes is reflected
 dielectric under a clear coat                      plastic: the coat on the base's colour
 reflection weakened, or an index beyond 1.79       plastic: its gloss and index
 black and no metal                                 ggx-dielectric
@@ -20,17 +21,27 @@ Pictures of what a model has as one number become their mean. Everything that is
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
 
 from studio_core.arrays import frozen_map
 from studio_core.exchange.surface import NORMAL, WHITE, Surface, alike, times
 from studio_core.params import Colour, Value
-from studio_core.scene.geometry import Texture
+from studio_core.scene.geometry import Image, Texture
 from studio_core.scene.nodes import Material, new_id
+from studio_core.shading.materials import first_channel, linear_rgb
+
+F32 = npt.NDArray[np.float32]
 
 MOST_TEXELS = 1 << 22
 """Of pictures of colour and metal together: a table of coefficients takes 48 bytes each."""
 HIGHEST_F0 = 0.08
+LEAST_F0 = 0.02
+"""From which on `specgloss` reflects all that grazes."""
+GRAZES_ALIKE = 0.01
+"""Mean difference of two surfaces' share of what grazes."""
 LEAST_GRAIN = 0.05
 LONG = 0.4  # width over length of a highlight under which a grain tells more than a round one
 COAT_COUNTS = 0.5
@@ -86,6 +97,9 @@ class _Choice:
             return self._coated()
         if black and s.metallic <= 0:
             return self._clear()
+        shine = self._shine() if not metal else None
+        if shine is not None:
+            return self._shining(shine)
         if not metal and not shaped and (s.specular < 1 or f0 > HIGHEST_F0 + 1e-9):
             return self._glossy()
         return self._ggx(f0)
@@ -137,6 +151,41 @@ class _Choice:
         }
         known = {name: name for name in ("base_color", "metallic", "roughness", "specular")}
         return self._made("ggx", values, known, "specular_color")
+
+    def _shine(self) -> Surface | None:
+        """With F0 as the reflection's colour, where it is not grey and F90 is that of `specgloss`."""
+        s = self.surface
+        colour, weight = s.textures.get("specular_color"), s.textures.get("specular")
+        if s.specular_color == WHITE and colour is None:
+            return None
+        share: F32 = np.array([s.specular], np.float32)
+        tint = np.asarray(s.specular_color, np.float32)
+        if colour is not None:
+            tint = tint * linear_rgb(colour.image)
+        if weight is not None:
+            if colour is None or not alike(colour, weight) or not _same_size(colour, weight):
+                return None
+            share = share * first_channel(weight.image)[..., None]
+        f0 = np.float32(s.f0) * share * tint
+        grazing = np.minimum(f0.max(axis=-1, keepdims=True) / np.float32(LEAST_F0), np.float32(1))
+        if np.abs(grazing - share).mean() > GRAZES_ALIKE:
+            return None
+        if colour is None:
+            return replace(s, specular_color=_triple(f0))
+        if weight is None:
+            return replace(s, specular_color=_triple(np.float32(s.f0) * share * np.asarray(s.specular_color)))
+        textures = {name: texture for name, texture in s.textures.items() if name != "specular"}
+        textures["specular_color"] = replace(colour, image=Image(f0))
+        return replace(s, specular_color=WHITE, textures=frozen_map(textures))
+
+    def _shining(self, shine: Surface) -> Material:
+        values: dict[str, Value] = {
+            "diffuse": shine.base_color,
+            "specular": shine.specular_color,
+            "roughness": shine.roughness,
+        }
+        known = {"base_color": "diffuse", "specular_color": "specular", "roughness": "roughness"}
+        return _Choice(shine, self.say)._made("specgloss", values, known)
 
     def _glossy(self) -> Material:
         s = self.surface
@@ -312,6 +361,15 @@ class _Choice:
 
     def _tell(self, what: str) -> None:
         self.say(f"{self.surface.name}: {what}.")
+
+
+def _triple(colour: F32) -> Colour:
+    red, green, blue = (float(min(max(c, 0.0), 1.0)) for c in colour)
+    return (red, green, blue)
+
+
+def _same_size(a: Texture, b: Texture) -> bool:
+    return a.image.pixels.shape[:2] == b.image.pixels.shape[:2]
 
 
 def _texels(texture: Texture) -> int:

@@ -5,6 +5,8 @@ model              surface
 =================  ==================================================================================
 lambert            matte: no reflection at all; oren-nayar with the roughness of its matte part
 ggx                metallic-roughness; its reflectance as an index of refraction
+specgloss          its matte colour, F0 as index and colour of the reflection, F90 as its weight; metal where
+                   it has no matte part
 ggx-conductor      metal with the tint of its rim
 ggx-dielectric     black with its index and the tint as the reflection's colour
 plastic            the light its ground sends back as base colour (depth included), under its index; gloss
@@ -18,7 +20,7 @@ ashikhmin-shirley  metals have the width that is nearest at all angles
 any other          fitted (`nearest`); a picture of how much light each texel returns
 =================  ==================================================================================
 
-Only lambert and ggx are exact; of all others the distance can be measured (`measuring`).
+Only lambert, ggx and specgloss are exact; of all others the distance can be measured (`measuring`).
 """
 
 from __future__ import annotations
@@ -40,7 +42,7 @@ from studio_core.exchange.surface import NORMAL, WHITE, Surface, ior_of, stretch
 from studio_core.params import Colour
 from studio_core.scene.geometry import Image, Texture
 from studio_core.scene.nodes import Material
-from studio_core.shading.materials import Resolved, coefficients, first_channel, resolve
+from studio_core.shading.materials import Resolved, coefficients, first_channel, linear_rgb, resolve
 from studio_core.shading.normal_maps import normal_texture, strength
 
 COMMON = 0.5  # cosine of the flattest directions by which Phong's highlights are compared: theirs don't
@@ -49,6 +51,8 @@ F32 = npt.NDArray[np.float32]
 SAME = 5e-4  # of the metric: nobody sees it
 NO_MATTE = 0.02  # albedo under which a material with a highlight counts as metal
 HIGHEST_F0 = 0.08
+LEAST_F0 = 0.02
+"""Under which `specgloss` reflects less than all that grazes."""
 BAND = 128
 GLOSSY_GROUND = 1
 
@@ -78,7 +82,7 @@ def surface_of(material: Material, registry: Registry) -> Outgoing:
     resolved = resolve(material, registry)
     notes = [resolved.problem] if resolved.problem else []
     model = resolved.brdf.id
-    exact = model in ("lambert", "ggx")
+    exact = model in ("lambert", "ggx", "specgloss")
     flat = Flat.of(resolved)
     samples = None if exact else flat.samples()
     if samples is None or model in _KNOWN:
@@ -141,6 +145,35 @@ def _ggx(resolved: Resolved, notes: list[str]) -> Surface:
         ior=ior_of(HIGHEST_F0 * specular),
         textures=_laid(resolved, base_color="base_color", metallic="metallic", roughness="roughness"),
     )
+
+
+def _shining(resolved: Resolved, notes: list[str]) -> Surface:
+    """F0 of a dielectric is that of its index, times the weight and the colour; F90 is the weight."""
+    v = _values(resolved)
+    picture = resolved.textures.get("specular")
+    f0 = np.clip(np.asarray(v["specular"], np.float32), 0, 1)
+    texels = f0 if picture is None else f0 * linear_rgb(picture.image)
+    brightest = texels.max(axis=-1, keepdims=True)
+    made = Surface(roughness=float(v["roughness"]))
+    if max(v["diffuse"]) <= 0 and float(brightest.min()) >= LEAST_F0:
+        laid = _laid(resolved, base_color="specular", roughness="roughness")
+        return replace(made, base_color=_colour(f0), metallic=1.0, textures=laid)
+    made = replace(made, base_color=_colour(v["diffuse"]))
+    textures = dict(_laid(resolved, base_color="diffuse", roughness="roughness"))
+    weight = np.minimum(brightest / np.float32(LEAST_F0), np.float32(1))
+    if not weight.any():
+        return replace(made, specular=0.0, textures=frozen_map(textures))
+    strongest = max(float(brightest.max()), LEAST_F0)
+    colour = texels / np.maximum(weight * np.float32(strongest), np.float32(1e-9))
+    made = replace(made, ior=ior_of(strongest))
+    if picture is None:
+        return replace(
+            made, specular=float(weight.max()), specular_color=_colour(colour), textures=frozen_map(textures)
+        )
+    textures["specular_color"] = _picture(colour, picture)
+    if weight.min() < 1:
+        textures["specular"] = _picture(weight, picture)
+    return replace(made, textures=frozen_map(textures))
 
 
 def _conductor(resolved: Resolved, notes: list[str]) -> Surface:
@@ -289,6 +322,7 @@ _KNOWN: dict[str, Callable[[Resolved, list[str]], Surface]] = {
     "lambert": _matte,
     "oren-nayar": _matte,
     "ggx": _ggx,
+    "specgloss": _shining,
     "ggx-conductor": _conductor,
     "ggx-dielectric": _clear,
     "plastic": _plastic,

@@ -151,35 +151,42 @@ class Ggx(_Lobed):
 
     def __init__(self, props: Any) -> None:
         _Lobed.__init__(self, props)
-        self.base_color = props.get_texture("base_color", 0.8)
-        self.metallic = props.get_texture("metallic", 0.0)
-        self.specular = props.get_texture("specular", 0.5)
+        self.take(props)
         self.alpha = max(float(props.get("alpha", 0.25)), 1e-4)
         numbers = [float(number) for number in str(props["facets"]).split()]
         self.plain, self.coloured, self.ground = numbers[:3]
         self.gap, self.edge = numbers[3:19], numbers[19:]
         self.facets = mi.MicrofacetDistribution(mi.MicrofacetType.GGX, self.alpha, True)
 
-    def reflectance(self, si: Any, wo: Any, active: Any) -> Any:
-        """The formula of the class."""
-        wi = si.wi
+    def take(self, props: Any) -> None:
+        """The parameters that colours are made of."""
+        self.base_color = props.get_texture("base_color", 0.8)
+        self.metallic = props.get_texture("metallic", 0.0)
+        self.specular = props.get_texture("specular", 0.5)
+
+    def colours(self, si: Any, active: Any) -> Any:
+        """Of the matte part below the rim and of that which has none, F0, F90, and what of F0 bounces."""
         base = self.base_color.eval(si, active)
         metallic, dielectric = self.metallic.eval_1(si, active), 0.08 * self.specular.eval_1(si, active)
         f0 = dielectric * (1 - metallic) + base * metallic
+        below = base * (1 - metallic)
+        return below * (1 - dielectric), mi.Color3f(0), f0, 1, _bounced(f0) + below * dielectric
+
+    def reflectance(self, si: Any, wo: Any, active: Any) -> Any:
+        """The formula of the class."""
+        wi = si.wi
+        below, plain, f0, f90, bounced = self.colours(si, active)
         h = dr.normalize(wi + wo)
         away = 1 - dr.clip(dr.dot(wi, h), 0, 1)
-        fresnel = f0 + (1 - f0) * away**5
+        fresnel = f0 + (f90 - f0) * away**5
         a2 = self.alpha**2
         slope = a2 * h.z * h.z + h.x * h.x + h.y * h.y
         density = a2 * INV_PI / (slope * slope)
         masking = _smith(wi.z, a2) * _smith(wo.z, a2)
         lost_i, lost_o = self._lost(wi.z), self._lost(wo.z)
-        matte = base * (1 - metallic) * (1 - dielectric) * INV_PI * self.ground
-        matte = matte * self._below(wi.z, lost_i) * self._below(wo.z, lost_o)
-        t = dr.maximum(f0 - 0.08, 0) / 0.92
-        below = base * (1 - metallic) * dielectric
-        bounced = self.plain * f0 + self.coloured * (0.49 * t * t / (1 - 0.51 * t) + below)
-        return matte + fresnel * density * masking + bounced * lost_i * lost_o
+        matte = below * self.ground * self._below(wi.z, lost_i) * self._below(wo.z, lost_o)
+        bounced = self.plain * f0 + self.coloured * bounced
+        return (matte + plain) * INV_PI + fresnel * density * masking + bounced * lost_i * lost_o
 
     def _lost(self, cosine: Any) -> Any:
         """What one bounce leaves out."""
@@ -199,6 +206,31 @@ class Ggx(_Lobed):
         """Of visible facets, through the half vector."""
         h = dr.normalize(wi + wo)
         return self.facets.pdf(wi, h) / (4 * dr.maximum(dr.dot(wi, h), 1e-6))
+
+
+class SpecularGloss(Ggx):
+    """The facets of `Ggx` under the colours of a matte part, `diffuse`, and of F0, `specular`.
+
+    F90 is 50 times F0's brightest channel, 1 at most; where it is less, so much of the matte part is plain.
+    """
+
+    def take(self, props: Any) -> None:
+        """The parameters that colours are made of."""
+        self.diffuse = props.get_texture("diffuse", 0.8)
+        self.specular = props.get_texture("specular", 0.04)
+
+    def colours(self, si: Any, active: Any) -> Any:
+        """As of `Ggx`."""
+        diffuse, f0 = self.diffuse.eval(si, active), self.specular.eval(si, active)
+        f90 = dr.minimum(50 * dr.max(f0), 1)
+        matte = diffuse * (1 - f0)
+        return matte * f90, matte * (1 - f90), f0, f90, (1 - diffuse) * _bounced(f0) + diffuse * f0
+
+
+def _bounced(f0: Any) -> Any:
+    """g(F0): how much more than B F0 the light between facets has of F0."""
+    t = dr.maximum(f0 - 0.08, 0) / 0.92
+    return 0.49 * t * t / (1 - 0.51 * t)
 
 
 def _curve(s: Any, numbers: list[float]) -> Any:
@@ -242,3 +274,4 @@ def register() -> None:
     mi.register_bsdf("lucarne_phong", Phong)
     mi.register_bsdf("lucarne_blinn_phong", BlinnPhong)
     mi.register_bsdf("lucarne_ggx", Ggx)
+    mi.register_bsdf("lucarne_specgloss", SpecularGloss)

@@ -8,6 +8,7 @@ phong          `lucarne_phong` (bsdfs.py)
 blinn-phong    `lucarne_blinn_phong` (bsdfs.py)
 ggx            `roughconductor` without material where F = 1 (white metal) and nothing bounces between
                facets (keep_energy off); else `lucarne_ggx`
+specgloss      `lucarne_specgloss`
 any other      the nearest of `diffuse` and `lucarne_ggx`, with a note that tells how far it is
 =============  =====================================================================================
 
@@ -37,7 +38,8 @@ from studio_core.shading.materials import Resolved, linear, resolve
 from studio_core.shading.normal_maps import normal_texture, strength, turn, unit_normals
 from studio_plugins.export.mitsuba_xml import prop, put, ref, rgb
 
-OWN = {"phong": "lucarne_phong", "blinn-phong": "lucarne_blinn_phong", "ggx": "lucarne_ggx"}
+FACETS = {"ggx": "lucarne_ggx", "specgloss": "lucarne_specgloss"}
+OWN = {"phong": "lucarne_phong", "blinn-phong": "lucarne_blinn_phong", **FACETS}
 LEAST_ALPHA = 1e-4
 MATTE = 1e-3  # reflectance head-on under which nobody sees a shine
 
@@ -114,7 +116,7 @@ class Materials:
         elif model in OWN:
             made = put(self.root, "bsdf", OWN[model], key=key)
             for name in param_infos(resolved.brdf.Params):
-                if model == "ggx" and name == "roughness":
+                if model in FACETS and name == "roughness":
                     numbers = resolved.brdf.shape(values)
                     prop(made, "float", "alpha", float(numbers[0]))
                     prop(made, "string", "facets", " ".join(repr(float(v)) for v in numbers[1:]))

@@ -86,6 +86,7 @@ def test_every_slot_has_its_material(host: PluginHost, parts: Any, tmp_path: Pat
         (Material(id="m", model="phong"), "lucarne_phong"),
         (Material(id="m", model="blinn-phong"), "lucarne_blinn_phong"),
         (Material(id="m", model="ggx"), "lucarne_ggx"),
+        (Material(id="m", model="specgloss"), "lucarne_specgloss"),
         (
             Material(id="m", model="ggx", values={"metallic": 1.0, "base_color": (1.0, 1.0, 1.0)}),
             "lucarne_ggx",
@@ -107,7 +108,7 @@ def test_models_are_native_where_they_exist(
     root, _ = written(Scene().with_materials(material).with_nodes(box), host, tmp_path)
     side = next(b for b in root.findall("bsdf") if b.get("type") != "twosided")
     assert side.get("type") == plugin
-    if material.model == "ggx":
+    if material.model in ("ggx", "specgloss"):
         assert float(named(side, "alpha")) == 0.25
 
 

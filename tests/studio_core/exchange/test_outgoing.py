@@ -6,11 +6,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from studio_core.exchange.incoming import material_of
-from studio_core.exchange.measuring import Flat, distance
+from studio_core.exchange.measuring import Flat, between, distance
 from studio_core.exchange.nearest import fitted
 from studio_core.exchange.outgoing import surface_of
 from studio_core.exchange.surface import Surface, ior_of
@@ -18,7 +18,7 @@ from studio_core.library.presets import PRESETS
 from studio_core.registry import PluginHost
 from studio_core.scene.geometry import Image, Texture
 from studio_core.scene.nodes import Material
-from studio_core.shading.materials import resolve
+from studio_core.shading.materials import coefficients, resolve
 from studio_plugins.brdfs import plugin as brdfs
 
 HOST = PluginHost([brdfs])
@@ -87,6 +87,37 @@ def test_ggx_and_lambert_come_back(base: Any, metallic: float, roughness: float,
     again = material_of(surface_of(material("lambert", base_color=base), HOST).surface, notes.append)
     assert (again.model, again.values["base_color"]) == ("lambert", base)
     assert notes == []
+
+
+@settings(max_examples=60)
+@given(diffuse=COLOUR, specular=COLOUR, roughness=UNIT)
+def test_colour_and_shine_come_back(diffuse: Any, specular: Any, roughness: float) -> None:
+    """In a model that looks the same: grey ones as ggx, metals and what has no shine as they are."""
+    made = material("specgloss", diffuse=diffuse, specular=specular, roughness=roughness)
+    found = surface_of(made, HOST)
+    again = material_of(found.surface, lambda note: None)
+    black, grey = max(diffuse) == 0, len(set(specular)) == 1
+    assume(not (black and max(specular) < 0.02))  # then it becomes clear gloss
+    assume(not (grey and (0 < specular[0] < 0.02 or specular[0] > 0.08)))  # then plastic, or weaker gloss
+    assert between(resolve(again, HOST), resolve(made, HOST)) < 5e-4  # no index reflects all
+    assert found.notes == ()
+
+
+def test_a_picture_of_the_shine_comes_back() -> None:
+    rng = np.random.default_rng(0)
+    texels = rng.uniform(0, 0.3, (4, 4, 3)).astype(np.float32)
+    texels[0, 0] = (0.01, 0.004, 0.002)
+    colour = Texture(Image(rng.uniform(0, 1, (4, 4, 3)).astype(np.float32)), (2.0, 2.0))
+    made = material(
+        "specgloss", {"specular": Texture(Image(texels), (2.0, 2.0)), "diffuse": colour}, specular=(1.0,) * 3
+    )
+    found = surface_of(made, HOST).surface
+    assert found.textures["specular"].image.pixels.min() < 1
+    again = material_of(found, lambda note: None)
+    assert again.model == "specgloss"
+    np.testing.assert_allclose(
+        coefficients(resolve(again, HOST)), coefficients(resolve(made, HOST)), atol=1e-6
+    )
 
 
 @settings(max_examples=15)
