@@ -72,8 +72,10 @@ class Brdf(Protocol):
     `textures` are parameters of the coefficients that may have a picture, or names of maps that have no
     parameter: such a name is among `values` only where the material has that picture. A model may also have
     `shape_textures: tuple[str, ...]`, numbers of the shape that may: every vertex then has a shape of its
-    own. Coefficients must not depend on these unless they are among `textures` too. Where maps are made of
-    directions, `turning: str` names the parameter, in degrees, to which the pictures' rotation is added.
+    own. Coefficients must not depend on these unless they are among `textures` too. A model whose shape takes
+    long to make may have `shapes(rows) -> (K, n)`, of many values of a material at a time. Where maps are
+    made of directions, `turning: str` names the parameter, in degrees, to which the pictures' rotation is
+    added.
     `straightened: tuple[int, ...]` names terms of little weight whose coefficients, where one picture acts,
     may be replaced by the line nearest to them over its texels.
     """

@@ -80,7 +80,6 @@ class _Choice:
         textures = s.textures
         black = max(s.base_color) == 0 and "base_color" not in textures
         metal = s.metallic >= 0.5 or "metallic" in textures
-        shaped = "roughness" in textures
         f0 = s.f0 * s.specular * max(s.specular_color)
         dull = s.roughness >= DULL or s.specular <= 0
         if max(s.sheen_color) >= LEAST_SHEEN and dull and not metal and s.clearcoat < COAT_COUNTS:
@@ -100,7 +99,7 @@ class _Choice:
         shine = self._shine() if not metal else None
         if shine is not None:
             return self._shining(shine)
-        if not metal and not shaped and (s.specular < 1 or f0 > HIGHEST_F0 + 1e-9):
+        if not metal and (s.specular < 1 or f0 > HIGHEST_F0 + 1e-9):
             return self._glossy()
         return self._ggx(f0)
 
@@ -200,7 +199,7 @@ class _Choice:
         }
         if s.ior > 3:
             self._tell(f"its index of refraction became 3 instead of {s.ior:.3g}")
-        known = {"base_color": "base_color", "specular": "gloss"}
+        known = {"base_color": "base_color", "specular": "gloss", "roughness": "roughness"}
         return self._made("plastic", values, known, "specular_color")
 
     def _coated(self) -> Material:
@@ -235,9 +234,8 @@ class _Choice:
         red, green, blue = (s.specular * c for c in s.specular_color)
         tint: Colour = (red, green, blue)
         values: dict[str, Value] = {"tint": tint, "ior": min(max(s.ior, 1.01), 3.0), "roughness": s.roughness}
-        return self._made(
-            "ggx-dielectric", values, {"specular_color": "tint"}, "base_color", "specular_color"
-        )
+        known = {"specular_color": "tint", "roughness": "roughness"}
+        return self._made("ggx-dielectric", values, known, "base_color", "specular_color")
 
     def _conductor(self) -> Material:
         s = self.surface

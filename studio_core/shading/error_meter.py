@@ -36,8 +36,8 @@ from studio_core.shading.path_tracing import PathSettings, bounces_of, chosen_po
 from studio_core.shading.path_world import PathWorld, PathWorlds
 from studio_core.shading.pipeline import Pipeline
 from studio_core.shading.surface_points import (
+    between_vertices,
     mapped_points,
-    nearest_vertices,
     some_hits,
     surface_points,
     surface_uvs,
@@ -104,8 +104,8 @@ class ErrorMeter:
         seen = some_hits(hits, chosen)
         eye = np.asarray(frame.view.transform.translation, np.float64)
         points, uvs = surface_points(surfaces, seen, eye), surface_uvs(surfaces, seen, eye)
-        near = nearest_vertices(surfaces, seen, eye)
-        there = self._shapes.at(frame.scene, surfaces.materials, points.material, uvs, mesh, near)
+        between = between_vertices(surfaces, seen, eye)
+        there = self._shapes.at(frame.scene, surfaces.materials, points.material, uvs, between)
         facing = mapped_points(frame.scene, surfaces, points, uvs)
         truth = self._brute(points, facing, there, lighting, casters, frame, job)
         looks, lights = self._compositor.coefficients(surfaces, seen, table), _lights(frame)

@@ -115,6 +115,12 @@ def shape_textures(brdf: Brdf) -> tuple[str, ...]:
     return tuple(getattr(brdf, "shape_textures", ()))
 
 
+def shape_paints(brdf: Brdf) -> tuple[str, ...]:
+    """Parameters of the model's shape that strokes may change from vertex to vertex: these, and its gloss."""
+    gloss = getattr(brdf, "roles", {}).get("gloss")
+    return tuple(dict.fromkeys((*shape_textures(brdf), *([gloss] if gloss else []))))
+
+
 def first_channel(image: Image) -> npt.NDArray[np.float32]:
     """(H, W) what a picture multiplies numbers with, linear."""
     return linear(Image(image.pixels[:, :, :1], image.encoding))[..., 0]
@@ -169,9 +175,21 @@ def shapes(
     return Shapes(*made, flat, tuple(problems), tuple(tables), tilt=tilt if tilt.any() else None)
 
 
+def finite_shapes(brdf: Brdf, rows: Sequence[Mapping[str, Value]]) -> list[npt.NDArray[np.float32]]:
+    """`finite_shape` of many values of a material, by the model's own way to make them where it has one."""
+    many = getattr(brdf, "shapes", None)
+    if many is None or not rows:
+        return [finite_shape(brdf, values) for values in rows]
+    return [_finite(brdf, made) for made in many(rows)]
+
+
 def finite_shape(brdf: Brdf, values: Mapping[str, Value]) -> npt.NDArray[np.float32]:
     """What the model's kernel reads; PluginError when it is not finite."""
-    made = np.atleast_1d(np.asarray(brdf.shape(values), np.float32))
+    return _finite(brdf, brdf.shape(values))
+
+
+def _finite(brdf: Brdf, shape: npt.ArrayLike) -> npt.NDArray[np.float32]:
+    made = np.atleast_1d(np.asarray(shape, np.float32))
     if not np.isfinite(made).all():
         raise PluginError(f"model {brdf.id!r} gave a shape that is not finite")
     return made
@@ -251,6 +269,7 @@ __all__ = [
     "Resolved",
     "coefficients",
     "finite_shape",
+    "finite_shapes",
     "first_channel",
     "linear",
     "linear_rgb",
@@ -258,6 +277,7 @@ __all__ = [
     "resolve",
     "same_shapes",
     "scalar",
+    "shape_paints",
     "shape_textures",
     "shapes",
 ]

@@ -24,7 +24,7 @@ from studio_core.scene.paint import Paint
 from studio_core.scene.shading_mesh import ShadingMesh
 from studio_core.scene.world_mesh import WorldMesh
 from studio_core.shading.looks import PictureLooks
-from studio_core.shading.materials import Resolved, linear_rgb, resolve, shape_textures
+from studio_core.shading.materials import Resolved, linear_rgb, resolve, shape_paints
 
 F32 = npt.NDArray[np.float32]
 I32 = npt.NDArray[np.int32]
@@ -192,7 +192,7 @@ def coefficient_changes(material: Material, registry: Registry, changes: Changes
 
 def shape_changes(resolved: Resolved, changes: Changes) -> Changes:
     """Those of numbers that every vertex may have of its own."""
-    return {name: changes[name] for name in shape_textures(resolved.brdf) if name in changes}
+    return {name: changes[name] for name in shape_paints(resolved.brdf) if name in changes}
 
 
 def _means(resolved: Resolved) -> dict[str, F32]:

@@ -31,7 +31,7 @@ from studio_core.shading.artifacts import Casters, Lamp, Lighting, Shapes, Surfa
 from studio_core.shading.coefficients import Coefficients, CoefficientTable
 from studio_core.shading.lamps import disc_axes
 from studio_core.shading.materials import resolve
-from studio_core.shading.varying import ShapeTable
+from studio_core.shading.varying import Between, ShapeTable
 
 F32 = npt.NDArray[np.float32]
 F64 = npt.NDArray[np.float64]
@@ -68,8 +68,8 @@ class PathWorld:
 
     def shapes_at(self, material: I32, uvs: F32, vertex: I32) -> Shapes:
         """Where pictures or paint change shapes (`shapes.row` is not None): for points near vertices (P,)."""
-        near = vertex.astype(np.int64)
-        return self.table.at(self.scene, self.materials, material, uvs, self.vertices, near)
+        near = Between(self.vertices, vertex.astype(np.int64)[:, None], np.ones((len(vertex), 1), np.float32))
+        return self.table.at(self.scene, self.materials, material, uvs, near)
 
 
 class PathWorlds:
@@ -86,7 +86,8 @@ class PathWorlds:
         surfaces = surfaces.unrefined
         mesh, caster = surfaces.mesh, casters.primary
         nothing = np.zeros(0, np.int32), np.zeros((0, 2), np.float32)
-        shapes = self._table.at(scene, surfaces.materials, *nothing, mesh)
+        nowhere = Between(mesh, np.zeros((0, 1), np.int64), np.zeros((0, 1), np.float32))
+        shapes = self._table.at(scene, surfaces.materials, *nothing, nowhere)
         table = self._coefficients(scene, surfaces)
         handles = caster.handles()
         tracer = Tracer(

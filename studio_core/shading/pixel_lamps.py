@@ -3,7 +3,7 @@
 Between vertices a lamp's light is interpolated; a highlight narrower than the mesh is lost or wanders.
 Point, spot and directional lamps need one shadow ray (or a few) a hit, so these can be lit one by one, by
 the same light sum as vertices (`brute_force.lamp_layer`), at the hit's own normal (with its map), tangent and
-roughness.
+roughness (with its picture and paint).
 """
 
 from __future__ import annotations
@@ -33,7 +33,13 @@ from studio_core.shading.job import Job
 from studio_core.shading.kept import Kept
 from studio_core.shading.normal_maps import NORMAL, normal_texture
 from studio_core.shading.pipeline import Inputs
-from studio_core.shading.surface_points import mapped_points, some_hits, surface_points, surface_uvs
+from studio_core.shading.surface_points import (
+    between_vertices,
+    mapped_points,
+    some_hits,
+    surface_points,
+    surface_uvs,
+)
 from studio_core.shading.varying import ShapeTable
 
 F32 = npt.NDArray[np.float32]
@@ -55,7 +61,7 @@ class PixelLamps:
     casters: Casters
     lamps: dict[str, Lamp]
     eye: F64
-    look: Callable[[ChosenPoints, F32], tuple[ChosenPoints, Shapes]]
+    look: Callable[[ChosenPoints, Hits], tuple[ChosenPoints, Shapes]]
     workers: Any
     counts: dict[str, int] = dataclasses.field(default_factory=lambda: {"hits_lit": 0})
     _kept: dict[tuple[str, int], tuple[Hits, object, F32]] = dataclasses.field(default_factory=dict)
@@ -85,7 +91,7 @@ class PixelLamps:
             block = met[first : first + HITS]
             some = some_hits(hits, block)
             points = surface_points(self.surfaces, some, self.eye)
-            facing, there = self.look(points, surface_uvs(self.surfaces, some, self.eye))
+            facing, there = self.look(points, some)
             layer = lamp_layer(
                 facing, there, self.casters.shadow, self.lamps[node], self.eye, all_points(points),
                 SUN_RAYS, self.workers, job, points,
@@ -118,12 +124,14 @@ class PixelLampsMaker:
         key = (surfaces, casters, inputs[Shapes], made.hits, *lamps.values(), *reliefs)
         scene, table, materials = frame.scene, self._table, surfaces.materials
 
-        def look(points: ChosenPoints, uvs: F32) -> tuple[ChosenPoints, Shapes]:
-            shapes = dataclasses.replace(table.at(scene, materials, points.material, uvs), tilt=None)
+        eye = np.asarray(frame.view.transform.translation, np.float64)
+
+        def look(points: ChosenPoints, hits: Hits) -> tuple[ChosenPoints, Shapes]:
+            uvs, between = surface_uvs(surfaces, hits, eye), between_vertices(surfaces, hits, eye)
+            shapes = dataclasses.replace(table.at(scene, materials, points.material, uvs, between), tilt=None)
             return mapped_points(scene, surfaces, points, uvs), shapes
 
         def fresh() -> PixelLamps:
-            eye = np.asarray(frame.view.transform.translation, np.float64)
             return PixelLamps(surfaces, casters, lamps, eye, look, self._workers)
 
         pixel = self._made(fresh, *key)

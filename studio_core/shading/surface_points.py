@@ -13,6 +13,7 @@ from studio_core.scene.tangents import arbitrary_tangents, perpendicular
 from studio_core.shading.artifacts import ChosenPoints, Hits, Surfaces
 from studio_core.shading.normal_maps import normal_texture, normals_at, strength
 from studio_core.shading.tilting import turned_points
+from studio_core.shading.varying import Between
 
 F32 = npt.NDArray[np.float32]
 F64 = npt.NDArray[np.float64]
@@ -54,11 +55,10 @@ def surface_uvs(surfaces: Surfaces, hits: Hits, eye: F64) -> F32:
     return at.astype(np.float32)
 
 
-def nearest_vertices(surfaces: Surfaces, hits: Hits, eye: F64) -> npt.NDArray[np.int64]:
-    """(P,) the corner that each hit is nearest to, of the side that is seen."""
+def between_vertices(surfaces: Surfaces, hits: Hits, eye: F64) -> Between:
+    """The corners that each hit lies between, of the side that is seen."""
     corners, weights, _ = _corners(surfaces, hits, eye)
-    nearest = np.take_along_axis(corners, np.argmax(weights, axis=1)[:, None], axis=1)
-    return nearest[:, 0].astype(np.int64)
+    return Between(surfaces.mesh, corners.astype(np.int64), weights.astype(np.float32))
 
 
 def _corners(surfaces: Surfaces, hits: Hits, eye: F64) -> tuple[npt.NDArray[np.integer[Any]], F64, F64]:
@@ -98,4 +98,4 @@ def some_hits(hits: Hits, chosen: npt.NDArray[np.int64]) -> Hits:
     return Hits(hits.view, hits.samples, hits.face[chosen], *uvt)
 
 
-__all__ = ["mapped_points", "some_hits", "surface_points", "surface_uvs"]
+__all__ = ["between_vertices", "mapped_points", "some_hits", "surface_points", "surface_uvs"]

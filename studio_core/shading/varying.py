@@ -26,7 +26,7 @@ from studio_core.scene.geometry import Image, Texture
 from studio_core.scene.nodes import MaterialId, Scene
 from studio_core.scene.world_mesh import WorldMesh
 from studio_core.shading.artifacts import Shapes
-from studio_core.shading.materials import Resolved, finite_shape, first_channel, resolve, scalar, shapes
+from studio_core.shading.materials import Resolved, finite_shapes, first_channel, resolve, scalar, shapes
 from studio_core.shading.normal_maps import mean_slope
 from studio_core.shading.painting import Changes, Coat, Coats, painted, shape_changes
 from studio_core.shading.texels import picture_areas, trilinear
@@ -109,9 +109,19 @@ class _Coated:
     coats: tuple[Coat, ...]
     own: I64
 
-    def at(self, vertices: I64) -> _Coated:
-        """At some of these vertices, which may be repeated."""
-        return dataclasses.replace(self, changes=self.changes[np.searchsorted(self.own, vertices)])
+    def at(self, corners: I64, shares: F32) -> _Coated:
+        """At points between such vertices (Q, K), of which each counts so much (Q, K)."""
+        changes = self.changes[np.searchsorted(self.own, corners)]
+        return dataclasses.replace(self, changes=np.einsum("qk,qkc->qc", shares, changes))
+
+
+@dataclass(frozen=True, eq=False)
+class Between:
+    """P points between vertices of a mesh: numbers (P, K), each of one object, and shares (P, K) of 1."""
+
+    mesh: WorldMesh
+    corners: I64
+    shares: F32
 
 
 NO_VERTICES = np.zeros(0, np.int64)
@@ -160,21 +170,22 @@ class ShapeTable:
         materials: Sequence[MaterialId],
         material: I32,
         uvs: F32,
-        mesh: WorldMesh | None = None,
-        vertex: I64 = NO_VERTICES,
+        between: Between | None = None,
     ) -> Shapes:
         """For points of our own, material (P,) and uvs (P, 2), at which pictures are not averaged.
 
-        With a mesh, paint is that of the vertices (P,) of it that the points are nearest to.
+        Paint is what vertices that they lie `between` have of it.
         """
         base, varying = self._begun(scene, materials)
-        coated = {} if mesh is None else self._coated(scene, materials, mesh)
+        coated = {} if between is None else self._coated(scene, materials, between.mesh)
         varying |= {m: resolve(scene.material(materials[m]), self._registry) for m in coated}
         found = []
         for number, resolved in varying.items():
             own = np.flatnonzero(material == number)
             nothing = np.zeros(len(own), np.float32)
-            coat = coated[number].at(vertex[own]) if number in coated else UNPAINTED
+            coat = UNPAINTED
+            if between is not None and number in coated:
+                coat = coated[number].at(between.corners[own], between.shares[own])
             found.append((number, resolved, own, self._steps(resolved, uvs[own], nothing, coat)))
         return _extended(base, material, found) if found else base
 
@@ -261,10 +272,11 @@ def _extended(base: Shapes, material: I32, found: Sequence[tuple[int, Resolved, 
     length = len(base.data) - 1
     for number, resolved, own, steps in found:
         row[own] = len(offset) + steps.which
-        for step in range(len(steps.texels)):
+        rows = [steps.values(resolved, step) for step in range(len(steps.texels))]
+        for shape in finite_shapes(resolved.brdf, rows):
             offset.append(length)
-            data.append(finite_shape(resolved.brdf, steps.values(resolved, step)))
-            length += len(data[-1])
+            data.append(shape)
+            length += len(shape)
         owner.append(np.full(len(steps.texels), number))
     of = np.concatenate(owner).astype(np.int64)
     flat = np.concatenate([*data, np.zeros(1, np.float32)])
@@ -280,4 +292,4 @@ def _extended(base: Shapes, material: I32, found: Sequence[tuple[int, Resolved, 
     )
 
 
-__all__ = ["MOST", "Grey", "ShapeTable", "Steps", "step_of", "stepped"]
+__all__ = ["MOST", "Between", "Grey", "ShapeTable", "Steps", "step_of", "stepped"]

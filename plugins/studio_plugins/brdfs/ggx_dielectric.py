@@ -121,6 +121,7 @@ class GgxDielectric(Rough, Functions):
     functions = evaluate, sample, density
     terms = 1
     textures: tuple[str, ...] = ("tint",)
+    shape_textures: tuple[str, ...] = ("roughness",)
     roles: Mapping[str, str] = frozen_map({"specular": "tint", "gloss": "roughness"})
 
     def shape(self, values: Mapping[str, Value]) -> npt.NDArray[np.float32]:

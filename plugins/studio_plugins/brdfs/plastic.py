@@ -24,7 +24,8 @@ depth          0…1       –      1: deep, saturated colour as under real lacq
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -49,7 +50,14 @@ from studio_core.kernels.brdf import (
 from studio_core.kernels.lobes import draw_cosine, draw_skin, weigh_cosine, weigh_skin
 from studio_core.params import Colour, Value, param
 from studio_plugins.brdfs.curves import at, curve, place, taken
-from studio_plugins.brdfs.facets import hemispherical, left_out, lost, mean_fresnel, mean_passage
+from studio_plugins.brdfs.facets import (
+    hemispherical,
+    left_out,
+    lost,
+    mean_fresnel,
+    mean_passage,
+    mean_passages,
+)
 from studio_plugins.brdfs.functions import Functions
 from studio_plugins.brdfs.ggx_dielectric import ior, roughness, skin
 from studio_plugins.brdfs.roles import Rough
@@ -134,23 +142,23 @@ class Plastic(Rough, Functions):
     functions = evaluate, sample, density
     terms = 2
     textures: tuple[str, ...] = ("base_color", "gloss")
+    shape_textures: tuple[str, ...] = ("roughness",)
     roles: Mapping[str, str] = frozen_map(
         {"diffuse": "base_color", "specular": "gloss", "gloss": "roughness"}
     )
 
     def shape(self, values: Mapping[str, Value]) -> npt.NDArray[np.float32]:
         """(37,): what describes the skin, F_ms, 1 / (π T̄), and the curve of what facets let through."""
-        alpha, index, found = skin(values)
-        missed, mean = found[3:], mean_passage(alpha, index)
-        average = hemispherical(lambda mu: left_out(missed, mu), alpha)
-        survives = float(found[2]) * np.pi * average
+        alpha, index, _ = skin(values)
+        return _shape(values, mean_passage(alpha, index))
 
-        def through(mu: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
-            gone = left_out(missed, mu)
-            return (1 - gone) * np.maximum(at(mean, mu), 0.0) + (1 - survives) * gone
-
-        ground = 1 / (np.pi * hemispherical(through, alpha))
-        return np.array([*found, survives, ground, *mean], np.float32)
+    def shapes(self, rows: Sequence[Mapping[str, Value]]) -> npt.NDArray[np.float32]:
+        """(K, 37) of many roughnesses, a hundredth of the time each: see `facets.mean_passages`."""
+        made = []
+        for values in rows:
+            alpha, index, _ = skin(values)
+            made.append(_shape(values, mean_passages(index).at(math.sqrt(alpha))))
+        return np.array(made, np.float32)
 
     def coefficients(self, values: Mapping[str, npt.NDArray[np.floating[Any]]]) -> npt.NDArray[np.float32]:
         """(..., 2, 3): gloss, and ρ (1 − F) / (1 − ρ F)."""
@@ -160,6 +168,21 @@ class Plastic(Rough, Functions):
         f = np.asarray(thrown, np.float32)[..., None]
         ground = base * (1 - f) / (1 - base * f)
         return np.stack(np.broadcast_arrays(gloss, ground), axis=-2)
+
+
+def _shape(values: Mapping[str, Value], mean: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:
+    """With the curve of what facets let through of one bounce."""
+    alpha, _, found = skin(values)
+    missed = found[3:]
+    average = hemispherical(lambda mu: left_out(missed, mu), alpha)
+    survives = float(found[2]) * np.pi * average
+
+    def through(mu: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+        gone = left_out(missed, mu)
+        return (1 - gone) * np.maximum(at(mean, mu), 0.0) + (1 - survives) * gone
+
+    ground = 1 / (np.pi * hemispherical(through, alpha))
+    return np.array([*found, survives, ground, *mean], np.float32)
 
 
 def inside(index: npt.ArrayLike) -> npt.NDArray[np.float64]:

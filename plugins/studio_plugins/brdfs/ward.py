@@ -129,6 +129,7 @@ class Ward(Rough, Functions, TwoLobes):
     label = "Brushed (Ward)"
     Params = Params
     functions = evaluate, sample, density
+    shape_textures: tuple[str, ...] = ("roughness",)
     roles: Mapping[str, str] = frozen_map(
         {"diffuse": "diffuse", "specular": "specular", "gloss": "roughness"}
     )

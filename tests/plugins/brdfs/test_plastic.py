@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from studio_core.brdfs.albedo import quadrature_albedo
+from studio_core.brdfs.promises import seen_from
 from studio_core.params import defaults
 from studio_plugins.brdfs.ggx_dielectric import MODEL as SKIN
 from studio_plugins.brdfs.plastic import MODEL, Params, inside
@@ -50,3 +51,14 @@ def test_depth_saturates_and_leaves_black_and_white_alone() -> None:
 def test_without_a_ground_it_is_the_clear_skin() -> None:
     given = values(roughness=0.4)
     np.testing.assert_array_equal(MODEL.shape(given)[:19], SKIN.shape(given))
+
+
+@pytest.mark.parametrize("index", [1.1, 1.5, 2.5])
+def test_many_shapes_at_a_time_are_nearly_the_same(index: float) -> None:
+    rows = [{**defaults(Params), "ior": index, "roughness": r} for r in (0.0, 0.03, 0.2, 0.45, 0.8, 1.0)]
+    wo = seen_from(np.radians([0, 30, 60, 80, 88]))
+    for values, made in zip(rows, MODEL.shapes(rows), strict=True):
+        expected = MODEL.shape(values)
+        np.testing.assert_array_equal(made[:20], expected[:20])
+        found, truth = (quadrature_albedo(MODEL, shape, wo, 1e-5) for shape in (made, expected))
+        np.testing.assert_allclose(found, truth, atol=4e-4)
