@@ -33,9 +33,10 @@ from studio_core.scene.nodes import (
     SpotLamp,
 )
 from studio_core.scene.transform import IDENTITY, Transform
+from studio_plugins.export.baking import baked
 from studio_plugins.export.gltf_buffer import Buffer, write_glb
 from studio_plugins.export.gltf_materials import Json, Materials
-from studio_plugins.export.photographed import paint_notes, without_catchers
+from studio_plugins.export.photographed import without_catchers
 from studio_plugins.export.shaded import shaded_parts
 
 LIGHTS = "KHR_lights_punctual"
@@ -53,13 +54,14 @@ class GlbExporter:
     def save(self, scene: Scene, path: Path, registry: Registry) -> tuple[str, ...]:
         """Write the file; what could not be expressed. InputError when it cannot be written."""
         scene, photograph = without_catchers(scene)
+        scene, painted = baked(scene, registry)
         writer = _Writer(scene, registry)
         document = writer.document()
         try:
             write_glb(Path(path), document, writer.buffer)
         except OSError as error:
             raise InputError(f"{path} cannot be written: {error.strerror or error}") from None
-        return tuple(photograph + paint_notes(scene) + writer.materials.notes + writer.notes)
+        return tuple(photograph + painted + writer.materials.notes + writer.notes)
 
 
 class _Writer:

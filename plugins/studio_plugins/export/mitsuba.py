@@ -23,10 +23,11 @@ import numpy.typing as npt
 from studio_core.contract import Registry
 from studio_core.errors import InputError
 from studio_core.scene.nodes import MaterialId, MeshObject, Scene
+from studio_plugins.export.baking import baked
 from studio_plugins.export.mitsuba_lights import add_cameras, add_lights
 from studio_plugins.export.mitsuba_materials import Materials
 from studio_plugins.export.mitsuba_xml import matrix, prop, put, ref
-from studio_plugins.export.photographed import background_notes, paint_notes, without_catchers
+from studio_plugins.export.photographed import background_notes, without_catchers
 from studio_plugins.export.shaded import ShadedPart, shaded_parts
 
 SHIPPED = {
@@ -62,6 +63,7 @@ class MitsubaExporter:
 
     def _save(self, scene: Scene, folder: Path, registry: Registry) -> tuple[str, ...]:
         scene, photograph = without_catchers(scene)
+        scene, painted = baked(scene, registry)
         root = Element("scene", version="3.0.0")
         for name, value in (
             ("width", self.width),
@@ -78,7 +80,7 @@ class MitsubaExporter:
         integrator = put(root, "integrator", "path")
         prop(integrator, "integer", "max_depth", "$max_depth")
         prop(integrator, "boolean", "hide_emitters", not visible)
-        notes = photograph + background_notes(scene) + paint_notes(scene) + materials.notes + notes
+        notes = photograph + background_notes(scene) + painted + materials.notes + notes
         for note in notes:
             root.insert(0, Comment(re.sub(r"-+", "-", f" {note} ")))
         indent(root)

@@ -20,12 +20,6 @@ def without_catchers(scene: Scene) -> tuple[Scene, list[str]]:
     return scene.with_nodes(*left), notes
 
 
-def paint_notes(scene: Scene) -> list[str]:
-    """Which shown objects are painted: what strokes changed is not in the file."""
-    painted = [node for node in scene.of(MeshObject) if node.paint is not None and scene.shown(node.id)]
-    return [f"{node.name}: its paint was left out; it has its plain materials." for node in painted]
-
-
 def background_notes(scene: Scene) -> list[str]:
     """What a background lacks where the environment is seen as it lights the scene, far away."""
     notes = []
