@@ -9,6 +9,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
+from oracles.gltf import check, parse
 from oracles.meshes import box
 
 from studio_core.arrays import frozen_map
@@ -77,6 +78,7 @@ def shaded(scene: Scene, services: Services) -> Any:
 def again(scene: Scene, host: PluginHost, path: Path) -> tuple[Scene, tuple[str, ...]]:
     """What the file's objects are, in the place of the scene's."""
     notes = EXPORTER.save(scene, path, host)
+    check(*parse(path.read_bytes()))
     model = IMPORTER.load(path)
     objects = [dataclasses.replace(node, parent=None) for node in model.objects]
     kept = {name: node for name, node in scene.nodes.items() if not isinstance(node, MeshObject)}
