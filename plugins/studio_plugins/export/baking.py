@@ -21,6 +21,7 @@ from studio_core.scene.atlas import MOST, Atlas, Texels, atlas_of, filled, texel
 from studio_core.scene.geometry import Geometry, Texture
 from studio_core.scene.nodes import Material, MaterialId, MeshObject, Scene
 from studio_core.scene.paint import Paint
+from studio_core.shading.looks import PictureLooks
 from studio_core.shading.materials import Resolved, resolve
 from studio_core.shading.normal_maps import NORMAL, normal_texture, normals_at, strength
 from studio_plugins.export.baked_looks import Look, is_constant, look_of, material_of, picture
@@ -104,7 +105,7 @@ class _Object:
         if not len(texels.row):
             self._tell(f"its paint was left out; {material.name} lies on slivers alone.")
             return None
-        spots = _spots(part, atlas, texels, slot)
+        spots = self._with_looks(_spots(part, atlas, texels, slot))
         look, lost = look_of(resolved, values_at(resolved, self.paint, spots))
         for name in lost:
             told = f"the {infos[name].label.lower()} of {material.name}"
@@ -121,6 +122,14 @@ class _Object:
         key = _new_id(self.scene, f"{material.id}-on-{self.node.id}")
         name = f"{material.name} on {self.node.name}"
         return atlas.geometry, material_of(look, material, textures, key, name, self.registry)
+
+    def _with_looks(self, spots: Spots) -> Spots:
+        if self.paint.looks is None or spots.slot >= len(self.node.materials):
+            return spots
+        looks = PictureLooks(self.registry)
+        slots = np.full(len(spots.places), spots.slot)
+        made = looks.at(looks.pictures(self.scene, self.node), spots.uvs, slots, spots.area)
+        return dataclasses.replace(spots, looks=made)
 
     def _tell(self, what: str) -> None:
         self.notes.append(f"{self.node.name}: {what}")

@@ -24,7 +24,8 @@ BLOCK = 1 << 16
 class Spots:
     """N spots of an object, in its own frame: places, normals (N, 3), and coordinates (N, 2) of pictures.
 
-    `slot` of its materials; `area` (N,) is how much of the coordinates' plane each has.
+    `slot` of its materials; `area` (N,) is how much of the coordinates' plane each has. `looks` (N, 3), where
+    paint follows the picture below it (`shading.looks`).
     """
 
     places: F64
@@ -32,6 +33,7 @@ class Spots:
     slot: int
     uvs: F32
     area: F32
+    looks: F32 | None = None
 
 
 def values_at(resolved: Resolved, paint: Paint, spots: Spots) -> dict[str, F32]:
@@ -79,7 +81,8 @@ def _changes(paint: Paint, spots: Spots, names: list[str]) -> Mapping[str, F32]:
     for start in range(0, count, BLOCK):
         some = slice(start, start + BLOCK)
         places = spots.places[some]
-        weights = paint.weights(places, spots.normals[some], np.full(len(places), spots.slot))
+        looks = None if spots.looks is None else spots.looks[some]
+        weights = paint.weights(places, spots.normals[some], np.full(len(places), spots.slot), looks)
         for name in names:
             made[name][some] = weights(paint.change(name))
     return made

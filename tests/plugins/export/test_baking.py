@@ -282,3 +282,27 @@ def test_mitsuba_gets_the_pictures(host: PluginHost, tmp_path: Path) -> None:
     files = {t.get("name"): t.find("string[@name='filename']") for t in side.findall("texture")}
     pixels = linear(read_image(tmp_path / str(files["specular"].get("value"))))  # type: ignore[union-attr]
     assert pixels.max() == pytest.approx(0.3, abs=0.02)
+
+
+def test_paint_that_follows_a_picture_stays_on_what_looks_alike(host: PluginHost) -> None:
+    """Dark and light squares; what was painted on light ones alone does not run over."""
+    geometry, _ = slanted()
+    squares = np.kron(np.indices((4, 4)).sum(axis=0) % 2, np.ones((8, 8)))[..., None] * np.ones(3) * 0.8 + 0.1
+    checks = Texture(Image(squares.astype(np.float32)))
+    paint = smooth(geometry, {"diffuse": (0.0, 0.0, 0.0)}, 2000)
+    light = looked_up(checks, paint.places, geometry)
+    changes = {"diffuse": np.where(light > 0.5, np.array([-0.3, 0, 0]), 0)}
+    paint = Paint.of(paint.places, paint.normals, paint.slots, changes, np.cbrt(light))
+    look = material("specgloss", {"diffuse": checks}, diffuse=(1.0, 1.0, 1.0))
+    made, _ = baked(scene_of(look, geometry, paint), host)
+    node = made["box"]
+    assert isinstance(node, MeshObject)
+    rng = np.random.default_rng(3)
+    places = np.stack([rng.uniform(0.1, 1.9, 900), np.zeros(900), rng.uniform(-0.9, -0.1, 900)], axis=1)
+    before = looked_up(checks, places, geometry)
+    found = looked_up(made.material(node.materials[0]).textures["diffuse"], places, node.geometry)
+    change = (found - before)[:, 0]
+    bright = before[:, 0] > 0.5
+    assert np.median(change[bright]) == pytest.approx(-0.3, abs=0.02)
+    assert np.median(change[~bright]) == pytest.approx(0, abs=0.02)
+    assert (np.abs(change[~bright]) > 0.1).mean() < 0.15
