@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import dataclasses
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -31,9 +31,10 @@ TINY = 1e-300
 
 @dataclass(frozen=True, eq=False)
 class Systems:
-    """Of E elements at L levels, one channel: c11 (E,), c12, c22 (E, L), d1 (E,), d2 (E, L), bb (E,).
+    """Of E elements at L levels in C channels, R = E · C: c11, d1, bb (R,), c12, c22, d2 (R, L).
 
-    now (E, 2) are the matte and shiny reflectance, level (E,) the gloss.
+    now (R, 2) are the matte and shiny reflectance, level (E,) the gloss. Channels of an element follow each
+    other: reflectances are their own, gloss and which parameters change are shared.
     """
 
     c11: F64
@@ -44,11 +45,12 @@ class Systems:
     bb: F64
     now: F64
     level: I64
+    channels: int = 1
 
 
 @dataclass(frozen=True, eq=False)
 class Chosen:
-    """reflectance (E, 2), level (E,), which parameters are new (E,) as KEPT … BOTH, and the residual (E,).
+    """reflectance (R, 2), level (E,), which parameters are new (E,) as KEPT … BOTH, and the residual (E,).
 
     flagged (E,): elements without light or with numbers that are none; they stay as they are.
     """
@@ -61,7 +63,7 @@ class Chosen:
 
 
 def fits(systems: Systems, literal: bool) -> F64:
-    """(E, L, 4, 2) reflectances by KEPT, DIFFUSE, SPECULAR, BOTH at every level; all feasible."""
+    """(R, L, 4, 2) reflectances by KEPT, DIFFUSE, SPECULAR, BOTH at every level; all feasible."""
     c11, c12, c22 = systems.c11[:, None], systems.c12, systems.c22
     d1, d2 = systems.d1[:, None], systems.d2
     rd, rs = systems.now[:, :1], systems.now[:, 1:]
@@ -123,18 +125,23 @@ def _nearest(made: F64, systems: Systems) -> F64:
 def choose(systems: Systems, solver: Solver, literal: bool = False) -> Chosen:
     """Equation 4 over a solver's candidates: `l0` one parameter, `l2` all of them, `mixed` any by weights."""
     count, levels = systems.c22.shape
+    channels, elements = systems.channels, len(systems.c22) // systems.channels
     arrays = (systems.c11, systems.d1, systems.bb, systems.now, systems.c12, systems.c22, systems.d2)
     good = np.logical_and.reduce([np.isfinite(one).reshape(count, -1).all(axis=1) for one in arrays])
-    lit = good & ((systems.c11 > TINY) | (systems.c22 > TINY).any(axis=1))
+    bright = (systems.c11 > TINY) | (systems.c22 > TINY).any(axis=1)
+    of_all = good.reshape(elements, channels).all(axis=1) & bright.reshape(elements, channels).any(axis=1)
+    lit = np.repeat(of_all, channels)
     names = ("c11", "c12", "c22", "d1", "d2", "bb")
-    kept = {name: np.where(_rows(lit, getattr(systems, name)), getattr(systems, name), 0) for name in names}
+    kept: dict[str, Any] = {
+        name: np.where(_rows(lit, getattr(systems, name)), getattr(systems, name), 0) for name in names
+    }
     clean = dataclasses.replace(systems, **kept, now=_rescaled(np.nan_to_num(systems.now)))
     made = fits(clean, literal)
     d, s = made[..., 0], made[..., 1]
     c11, c12, c22 = (one.reshape(count, -1, 1) for one in (clean.c11, clean.c12, clean.c22))
     d1, d2 = clean.d1.reshape(count, -1, 1), clean.d2[..., None]
     cost = c11 * d * d + 2 * c12 * d * s + c22 * s * s - 2 * d1 * d - 2 * d2 * s
-    cost = np.maximum(cost + clean.bb[:, None, None], 0)
+    cost = np.maximum(cost + clean.bb[:, None, None], 0).reshape(elements, channels, levels, 4).sum(axis=1)
     own = np.arange(levels) == clean.level[:, None]
     changed = np.array([0, 1, 1, 2]) + np.where(own, 0, 1)[..., None]
     allowed = {"l0": changed <= 1, "l2": changed >= 2, "mixed": changed >= 0}[solver]
@@ -144,14 +151,14 @@ def choose(systems: Systems, solver: Solver, literal: bool = False) -> Chosen:
     if solver == "l0":
         allowed = allowed & ~((changed == 0) & (np.arange(4) == KEPT))  # as printed: one always changes
     weight = np.asarray(WEIGHTS)[np.maximum(changed, 1)] if solver == "mixed" else np.ones(changed.shape)
-    rated = np.where(allowed, cost * weight, np.inf).reshape(count, -1)
+    rated = np.where(allowed, cost * weight, np.inf).reshape(elements, -1)
     best = np.argmin(rated, axis=1)
     level, kind = np.divmod(best, 4)
-    rows = np.arange(count)
-    found = np.where(lit[:, None], made[rows, level, kind], clean.now)
-    level = np.where(lit, level, systems.level)
-    residual = np.where(lit, cost[rows, level, kind], 0.0)
-    return Chosen(found, level, np.where(lit, kind, KEPT), residual, ~lit)
+    chosen = made[np.arange(count), np.repeat(level, channels), np.repeat(kind, channels)]
+    found = np.where(lit[:, None], chosen, clean.now)
+    residual = np.where(of_all, cost[np.arange(elements), level, kind], 0.0)
+    level = np.where(of_all, level, systems.level)
+    return Chosen(found, level, np.where(of_all, kind, KEPT), residual, ~of_all)
 
 
 def _rows(which: Bools, like: F64) -> Bools:
