@@ -6,8 +6,18 @@ import numpy as np
 import numpy.typing as npt
 
 from studio_core.jit import kernel
-from studio_plugins.slf.constrained import PIVOT, TINY
-from studio_plugins.slf.paper import BOTH, DIFFUSE, KEPT, SPECULAR, WEIGHTS, Chosen, Solver, Systems
+from studio_plugins.slf.paper import (
+    BOTH,
+    DIFFUSE,
+    KEPT,
+    PIVOT,
+    SPECULAR,
+    TINY,
+    WEIGHTS,
+    Chosen,
+    Solver,
+    Systems,
+)
 
 F64 = npt.NDArray[np.float64]
 I64 = npt.NDArray[np.int64]
