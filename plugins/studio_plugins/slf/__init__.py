@@ -12,6 +12,9 @@ Light Field Manipulation and Reflectance Optimization", 2013).
 - how far: `looks`, `spots`, `similarity` (what is alike a stroke), `upsampling` (from elements to all else),
   `field` (the change that is wanted anywhere), `points` and `spread` (paint that has it)
 - `solver`: the door
+- all elements at once: `links` (what they see), `lumitexels` and `series` (light of all directions), `lobes`,
+  `skylight`, `straight`, `moments`, `mixed`, and `whole` above them
+- to be seen: `appearance`, `splatting`, `backend`
 """
 
 from studio_core.contract import API, Plugin
@@ -21,6 +24,7 @@ plugin = Plugin(
     label="Strokes: the material that explains painted light",
     api=API,
     provides={
+        "backend": {"slf": "studio_plugins.slf.backend:BACKEND"},
         "solver": {
             "joint": "studio_plugins.slf.solver:SOLVER",
         },
