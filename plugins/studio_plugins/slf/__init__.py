@@ -14,7 +14,7 @@ Light Field Manipulation and Reflectance Optimization", 2013).
 - `solver`: the door
 - all elements at once: `links` (what they see), `lumitexels` and `series` (light of all directions), `lobes`,
   `skylight`, `straight`, `moments`, `mixed`, and `whole` above them
-- to be seen: `appearance`, `splatting`, `backend`
+- to be seen: `appearance`, `splatting`, `backend`; the whole scene sharpened: `stylise`
 """
 
 from studio_core.contract import API, Plugin

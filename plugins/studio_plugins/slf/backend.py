@@ -94,8 +94,8 @@ class ElementStage:
             suns = dataclasses.replace(lighting, tree=None)
             layer = environment_layer(mesh, shapes, suns, self._bits, eye, points, SUNS, self._workers, job)
             if lighting.tree is not None:
-                counts |= self._update(surfaces, casters, lighting, params.elements, job)
-                splatted = self._splatted(surfaces, shapes, points, eye - mesh.origin, job)
+                counts |= self.follow(surfaces, casters, lighting, params.elements, job)
+                splatted = self.splatted(surfaces, shapes, points, eye - mesh.origin)
                 layer = dataclasses.replace(
                     layer,
                     terms=layer.terms + splatted.terms,
@@ -106,9 +106,10 @@ class ElementStage:
         valid[points] = True
         return Radiance(surfaces, hits, layers, valid, 1 << SUNS, True, counts)
 
-    def _update(
+    def follow(
         self, surfaces: Surfaces, casters: Casters, lighting: Lighting, count: int, job: Job
     ) -> dict[str, int]:
+        """Elements and what they see of the sky, up to date; counts."""
         if self._whole is None or self._count != count:
             self._whole, self._count = Whole(self._workers, count), count
         assert lighting.environment is not None
@@ -120,7 +121,7 @@ class ElementStage:
         self._inside = (self._few.share_back > BURIED)[self._few.row_of]
         return {"elements": len(self._whole.elements), "rays": counts.rays + few.rays}
 
-    def _splatted(self, surfaces: Surfaces, shapes: Shapes, points: I64, eye: F64, job: Job) -> LayerRadiance:
+    def splatted(self, surfaces: Surfaces, shapes: Shapes, points: I64, eye: F64) -> LayerRadiance:
         """What the environment's light comes to at vertices, of all terms."""
         whole, mesh = self._whole, surfaces.mesh
         assert whole is not None
@@ -136,7 +137,7 @@ class ElementStage:
             for start, stop in todo[first:last]:
                 _give(whole, field, own[start:stop], splats, to_eye, start, stop, values)
 
-        self._workers.run(len(todo), 4, body, job)
+        self._workers.run(len(todo), 4, body)
         sums = splats.sums(values)
         layer = blank_layer(mesh, shapes)
         layer.irradiance[points] = np.pi * sums[:, 0]
