@@ -1,6 +1,6 @@
 """Stylising a scene: materials under which its light looks sharpened (unsharp masking, figure 22).
 
-What is wanted is l_o + amount · (l_o − its mean over the elements around, in the same direction of the world).
+What is wanted is l_o + amount · (l_o − its mean over elements around, in the same direction of the world).
 All elements are solved for it; the answer is paint on all objects: parameters times what albedos were
 multiplied with, so that pictures, and what a material has beyond the paper's three numbers, stay as they are.
 """
