@@ -26,8 +26,8 @@ from studio_core.transport.operator import Transport
 from studio_core.transport.reflectance import VertexCoefficients
 from studio_plugins.slf.appearance import Appearance
 from studio_plugins.slf.backend import ElementStage, Params
-from studio_plugins.slf.lumitexels import LightField
 from studio_plugins.slf.links import cell_pattern, links
+from studio_plugins.slf.lumitexels import LightField
 from studio_plugins.slf.whole import Reflectances, Whole
 
 CASES = ("visibility", "full-solve", "three-bounces", "splatting", "memory")

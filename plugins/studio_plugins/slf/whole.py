@@ -19,9 +19,9 @@ from studio_core.shading.artifacts import Casters, Lighting, Surfaces
 from studio_core.transport.cells import CELLS, PARTS, RINGS
 from studio_core.transport.operator import Counts, Transport
 from studio_plugins.slf.elements import COUNT, Elements
-from studio_plugins.slf.lumitexels import LightField
 from studio_plugins.slf.ladder import LEVELS
 from studio_plugins.slf.links import cell_pattern, frames_of, links
+from studio_plugins.slf.lumitexels import LightField
 from studio_plugins.slf.mixed import choose_all
 from studio_plugins.slf.moments import moments
 from studio_plugins.slf.paper import Solver

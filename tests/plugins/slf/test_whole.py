@@ -19,9 +19,9 @@ from studio_core.scene.transform import Transform
 from studio_core.transport.cells import CELLS, PARTS, RINGS
 from studio_core.transport.hits import BLACK, NOTHING
 from studio_core.transport.operator import Transport
-from studio_plugins.slf.lumitexels import LightField
 from studio_plugins.slf.links import cell_pattern
 from studio_plugins.slf.lobes import albedos, spectra
+from studio_plugins.slf.lumitexels import LightField
 from studio_plugins.slf.paper import DIFFUSE, KEPT
 from studio_plugins.slf.series import light_of, matte_of, series_of
 from studio_plugins.slf.whole import Reflectances, Whole
