@@ -66,7 +66,8 @@ def _is_far(stroke: Stroke) -> bool:
 
 
 def _covered(scene: Scene) -> set[NodeId]:
-    return {node for stroke in scene.of(Stroke) if not stroke.hidden for node in stroke.objects}
+    shown = [stroke for stroke in scene.of(Stroke) if not stroke.hidden]
+    return {node for stroke in shown for node in (*stroke.objects, *stroke.reached)}
 
 
 __all__ = ["applied", "bared", "concerned", "removed"]

@@ -25,8 +25,9 @@ class Stroke(Node):
     """Light that is wanted at places of `objects`; `hidden` strokes count for nothing.
 
     Each is solved on what those before have made, or, `together` with the one before it, as one with that.
-    `flat` tells that one colour was painted over everything: then its mean is meant, not its shape. `reach`
-    has σ_s, σ_n, σ_r of equation "s(x, y)" of section 4.3: how the change spreads to similar surface.
+    `flat` tells that one colour was painted over everything: then its mean is meant, not its shape. `near`,
+    `facing` and `alike` are σ_s, σ_n and σ_r of section 4.3's s(x, y): how the change spreads to similar
+    surface. `reached` are other objects on which it changes something, as last found.
     """
 
     tool: str = param(REPLACE, "Tool", choices=TOOLS)
@@ -42,6 +43,7 @@ class Stroke(Node):
     alike: float = param(0.0, "Likeness", "How much only surfaces that look alike do", low=0.0, high=100.0)
     objects: tuple[NodeId, ...] = ()
     table: Table | None = None
+    reached: tuple[NodeId, ...] = ()
 
     def __post_init__(self) -> None:
         marks = self.marks

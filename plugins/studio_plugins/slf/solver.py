@@ -8,7 +8,7 @@ what was painted, minus what was shown. So what the model does not know (fine te
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -20,6 +20,7 @@ from studio_core.contract import Services
 from studio_core.params import param
 from studio_core.scene.nodes import Material, MeshObject, NodeId, Scene
 from studio_core.scene.paint import Paint
+from studio_core.shading.artifacts import Surfaces
 from studio_core.shading.job import Job
 from studio_core.strokes.marks import Marks
 from studio_core.strokes.paintable import paintable
@@ -28,11 +29,15 @@ from studio_core.strokes.solved import Solved
 from studio_core.strokes.stroke import AUTOMATIC, FIXATE, Stroke
 from studio_plugins.slf.columns import sums_at
 from studio_plugins.slf.dressed import Dressed
+from studio_plugins.slf.field import Decided, Field, Layer
 from studio_plugins.slf.incident import Arriving, Incident
 from studio_plugins.slf.joint import SINGLE, Change, Explanation, Verdict, decide
 from studio_plugins.slf.places import Places, places_of
 from studio_plugins.slf.regions import Region, regions_of, steps
 from studio_plugins.slf.samples import F64, Reflectance, Samples
+from studio_plugins.slf.similarity import Reach
+from studio_plugins.slf.spots import SLOTS
+from studio_plugins.slf.spread import Spread
 
 WORDS: Mapping[Change, str] = {
     Change.NONE: "",
@@ -45,6 +50,10 @@ WORDS: Mapping[Change, str] = {
     Change.DIFFUSE | Change.SPECULAR | Change.GLOSS: "everything",
 }
 MEANT = {word: change for change, word in WORDS.items()}
+STRANGE = 0.15
+"""Relative error of a place's light as it is, from which on it says little of how it would change."""
+TOLD = 4
+"""Reasons that are shown, each with its edit."""
 
 
 @dataclass(frozen=True)
@@ -83,6 +92,7 @@ class JointRun:
     def __init__(self, services: Services) -> None:
         self._services = services
         self._incident = Incident(services)
+        self._spread = Spread(services)
 
     def solve(self, scene: Scene, strokes: Sequence[NodeId], lit: Lit, params: Params, job: Job) -> Solution:
         """See `studio_core.contract.StrokeRun`."""
@@ -92,8 +102,8 @@ class JointRun:
         found: dict[Region, _Painted] = {}
         for region, todo in steps(scene, regions).items():
             name = region.material(scene)
-            if name is None:
-                continue
+            if name is None or region.node not in lit.surfaces.nodes:
+                continue  # gone, or hidden: it keeps what it has
             painting = _Painted.begin(scene.material(name), self._services)
             if painting is None:
                 notes.append(f"nothing of {scene.material(name).name} can be painted")
@@ -101,12 +111,11 @@ class JointRun:
             for group in todo:
                 self._explain(painting, region, group, scene, lit, params, job)
             found[region] = painting
-        edit = _edit(scene, found, {}, _label(scene, asked, found))
-        findings = []
-        for region, painting in found.items():
-            finding = _finding(scene, found, region, painting, {stroke.id for stroke in asked})
-            if finding is not None:
-                findings.append(finding)
+        canvas = _Canvas(scene, lit.surfaces, self._spread, self._services, found)
+        edit = canvas.edit(_label(scene, asked, found))
+        names = {stroke.id for stroke in asked}
+        told = (_finding(canvas, region, names) for region in found)
+        findings = [finding for finding in told if finding is not None]
         counts = {
             "places": sum(step.places for painting in found.values() for step in painting.steps),
             "rays": sum(painting.rays for painting in found.values()),
@@ -115,16 +124,11 @@ class JointRun:
         return Solution(edit, tuple(findings), tuple(notes), frozen_map(counts))
 
     def likeness(self, scene: Scene, stroke: NodeId, lit: Lit, params: Params, job: Job) -> Any:
-        """1 on the slots that the stroke lies on."""
-        mesh = lit.surfaces.unrefined.mesh
-        made = np.zeros(len(mesh), np.float32)
+        """See `studio_core.contract.StrokeRun`; before the stroke is solved, by materials as they are."""
         node = scene.nodes.get(stroke)
-        for region in regions_of(node) if isinstance(node, Stroke) else ():
-            if region.node in lit.surfaces.nodes:
-                index = mesh.index_of(region.node)
-                some = mesh.vertices_of(index)
-                made[some][mesh.objects[index].mesh.slot == region.slot] = 1
-        return made
+        if not isinstance(node, Stroke):
+            return np.zeros(len(lit.surfaces.unrefined.mesh), np.float32)
+        return self._spread.likeness(scene, lit.surfaces, node)
 
     def _explain(
         self,
@@ -188,22 +192,9 @@ class _Painted:
     def take(self, step: Step) -> None:
         """Goes on from its best explanation."""
         self.steps.append(step)
-        self.changes = self.after(step.verdict.best, step, self.changes)
-
-    def after(self, one: Explanation, step: Step, before: Mapping[str, F64]) -> dict[str, F64]:
-        """Changes of parameters with an explanation of a step that follows others."""
-        added = self.dressed.changes(step.now, step.gloss, one.reflectance, one.change)
-        made = dict(before)
-        for name, change in added.items():
-            made[name] = made.get(name, np.zeros_like(change)) + change
-        return made
-
-    def without_last(self) -> dict[str, F64]:
-        """Changes before the last step."""
-        made: dict[str, F64] = {}
-        for step in self.steps[:-1]:
-            made = self.after(step.verdict.best, step, made)
-        return made
+        best = step.verdict.best
+        for name, change in self.dressed.changes(step.now, step.gloss, best.reflectance, best.change).items():
+            self.changes[name] = self.changes.get(name, np.zeros_like(change)) + change
 
 
 def _on(stroke: Stroke, places: Places, region: Region) -> npt.NDArray[np.bool_]:
@@ -227,8 +218,16 @@ def _samples(
     before = np.einsum("ntc,tc->nc", sums[-1], coefficients)
     known = np.isfinite(marks.offset).all(axis=1, keepdims=True)
     offset = np.where(known, marks.offset, shown - before)
-    weight = marks.weight.astype(np.float64) * stroke.weight
+    weight = marks.weight.astype(np.float64) * stroke.weight * _trust(offset, shown, before)
     return Samples(wanted - offset, before, sums[:-1], sums[-1], weight), offset
+
+
+def _trust(offset: F64, shown: F64, before: F64) -> F64:
+    """(N,) how well the model knows the light of a place: 1 / (1 + (its relative error / STRANGE)²)²."""
+    error = np.abs(offset).mean(axis=1)
+    light = np.maximum(np.abs(shown), np.abs(before)).mean(axis=1)
+    relative = error / np.maximum(light, 1e-30)
+    return np.asarray(1 / (1 + (relative / STRANGE) ** 2) ** 2)
 
 
 def _pooled(parts: Sequence[tuple[Stroke, Samples, Places]]) -> Samples:
@@ -280,32 +279,82 @@ def _tints(samples: Samples, dressed: Dressed, now: Reflectance) -> tuple[F64, .
 # -- edits and reasons -----------------------------------------------------------------------------
 
 
-def _edit(
-    scene: Scene,
-    found: Mapping[Region, _Painted],
-    instead: Mapping[Region, dict[str, F64]],
-    label: str,
-    meanings: Mapping[NodeId, str] = frozen_map(),
-) -> Solved:
-    """Paint on all regions, in some with other changes than the best."""
-    paints: dict[NodeId, Paint | None] = {}
-    materials: dict[str, Material] = {}
-    strokes: dict[NodeId, dict[str, Any]] = {}
-    for region, painting in found.items():
-        changes = instead.get(region, painting.changes)
-        node = scene[region.node]
-        assert isinstance(node, MeshObject)
-        paints[node.id] = _with_slot(paints.get(node.id, node.paint), region.slot, changes)
-        if changes and painting.dressed.material is not painting.was:
-            materials[painting.was.id] = painting.dressed.material
-        for stroke_id, offsets in painting.offsets.items():
-            stroke = scene[stroke_id]
-            assert isinstance(stroke, Stroke)
-            table = strokes.get(stroke_id, {}).get("table", stroke.table)
-            strokes.setdefault(stroke_id, {})["table"] = _with_offsets(table, offsets)
-    for stroke_id, meaning in meanings.items():
-        strokes.setdefault(stroke_id, {})["meaning"] = meaning
-    return Solved(label, frozen_map(paints), tuple(materials.values()), frozen_map(strokes))
+@dataclass(frozen=True, eq=False)
+class _Canvas:
+    """What edits are made from: the scene, who lies where, how changes spread, and what was decided."""
+
+    scene: Scene
+    surfaces: Surfaces
+    spread: Spread
+    services: Services
+    found: Mapping[Region, _Painted]
+
+    @property
+    def whose(self) -> frozenset[NodeId]:
+        """Objects whose paint is made anew: those with strokes, and those that strokes reached before."""
+        nodes = {region.node for region in self.found}
+        nodes.update(node for stroke in self._strokes() for node in stroke.reached)
+        return frozenset(node for node in nodes if isinstance(self.scene.nodes.get(node), MeshObject))
+
+    def edit(
+        self,
+        label: str,
+        instead: Mapping[Region, Explanation] = frozen_map(),
+        meanings: Mapping[NodeId, str] = frozen_map(),
+    ) -> Solved:
+        """Paint on all regions, where the last steps of some end in other explanations than the best."""
+        materials = {
+            painting.was.id: painting.dressed.material
+            for painting in self.found.values()
+            if painting.changes or instead
+        }
+        scene = self.scene.with_materials(*materials.values())
+        field = Field([layer for region in self.found for layer in self._layers(region, instead.get(region))])
+        made = self.spread(scene, self.surfaces, field) if field.layers else {}
+        others = {node for stroke in scene.of(Stroke) if not stroke.hidden for node in stroke.objects}
+        paints: dict[NodeId, Paint | None] = dict.fromkeys(self.whose)
+        for node, paint in made.items():
+            if node in paints or node not in others:
+                paints[node] = paint
+        strokes: dict[NodeId, dict[str, Any]] = {}
+        for painting in self.found.values():
+            for stroke_id, offsets in painting.offsets.items():
+                values = strokes.setdefault(stroke_id, {})
+                table = values.get("table", getattr(scene[stroke_id], "table", None))
+                values["table"] = _with_offsets(table, offsets)
+        for stroke in self._strokes():
+            beyond = (node for node, paint in paints.items() if paint is not None and node not in others)
+            reached = tuple(beyond) if stroke.alike else ()
+            if reached != stroke.reached:
+                strokes.setdefault(stroke.id, {})["reached"] = reached
+        for stroke_id, meaning in meanings.items():
+            strokes.setdefault(stroke_id, {})["meaning"] = meaning
+        for node, own in paints.items():
+            for slot in np.unique(own.slots).tolist() if own is not None else ():
+                material = Region(node, int(slot)).material(scene)
+                if material is not None:
+                    materials[material] = paintable(scene.material(material), self.services.registry)
+        changed = tuple(new for name, new in materials.items() if new is not self.scene.material(name))
+        return Solved(label, frozen_map(paints), changed, frozen_map(strokes))
+
+    def _strokes(self) -> list[Stroke]:
+        steps = [step for painting in self.found.values() for step in painting.steps]
+        return [*{stroke.id: stroke for step in steps for stroke in step.strokes}.values()]
+
+    def _layers(self, region: Region, last: Explanation | None) -> Iterator[Layer]:
+        painting = self.found[region]
+        part = self.surfaces.unrefined.mesh.index_of(region.node) * SLOTS + region.slot
+        for step in painting.steps:
+            one = step.verdict.best if last is None or step is not painting.steps[-1] else last
+            changes = painting.dressed.changes(step.now, step.gloss, one.reflectance, one.change)
+            layer = []
+            for stroke in step.strokes if changes else ():
+                marks = self.spread.marks(self.scene, self.surfaces, stroke)
+                own = marks.some(marks.part == part)
+                if stroke.tool != FIXATE and len(own):
+                    layer.append(Decided(own, Reach.of(stroke), changes))
+            if layer:
+                yield layer
 
 
 def _with_offsets(table: Any, offsets: Sequence[tuple[npt.NDArray[np.int64], F64]]) -> Any:
@@ -318,43 +367,18 @@ def _with_offsets(table: Any, offsets: Sequence[tuple[npt.NDArray[np.int64], F64
     return dataclasses.replace(marks, offset=made).table()
 
 
-def _with_slot(paint: Paint | None, slot: int, changes: Mapping[str, F64]) -> Paint | None:
-    """The paint with one slot changed alike everywhere, and others as they are."""
-    kept = np.flatnonzero(paint.slots != slot) if paint is not None else np.zeros(0, np.int64)
-    if not changes and not len(kept):
-        return None
-    one = 1 if changes else 0
-    places, normals = np.zeros((one, 3), np.float32), np.tile(np.array([0, 0, 1], np.float32), (one, 1))
-    slots, names = np.full(one, slot), [*changes]
-    old: dict[str, F64] = {}
-    if paint is not None:
-        places = np.concatenate([paint.places[kept], places])
-        normals = np.concatenate([paint.normals[kept], normals])
-        slots = np.concatenate([paint.slots[kept], slots])
-        old = {name: np.asarray(paint.change(name)[kept], np.float64) for name in paint.changes}
-    made = {}
-    for name in dict.fromkeys([*old, *names]):
-        width = old[name].shape[1] if name in old else len(changes[name])
-        first = old.get(name, np.zeros((len(kept), width)))
-        last = changes[name][None] if name in changes else np.zeros((one, width))
-        made[name] = np.concatenate([first, last[:one]])
-    return Paint.of(places, normals, slots, made)
-
-
-def _finding(
-    scene: Scene, found: Mapping[Region, _Painted], region: Region, painting: _Painted, asked: set[NodeId]
-) -> Finding | None:
+def _finding(canvas: _Canvas, region: Region, asked: set[NodeId]) -> Finding | None:
     """Of the last step, if one of the asked strokes is in it."""
+    painting = canvas.found[region]
     if not painting.steps or asked.isdisjoint(stroke.id for stroke in painting.steps[-1].strokes):
         return None
-    step, before = painting.steps[-1], painting.without_last()
+    step = painting.steps[-1]
     reasons = []
     who = [stroke for stroke in step.strokes if stroke.tool != FIXATE and stroke.id in asked]
-    for one in step.verdict.explanations:
+    for one in step.verdict.explanations[:TOLD]:
         word = WORDS[one.change]
-        changes = painting.after(one, step, before)
         meanings = {stroke.id: word for stroke in who} if word else {}
-        edit = _edit(scene, found, {region: changes}, _told(scene, region, word), meanings)
+        edit = canvas.edit(_told(canvas.scene, region, word), {region: one}, meanings)
         values = painting.dressed.values(one.reflectance)
         reasons.append(Reason(word, one.explained, one.score, frozen_map(values), edit))
     silent = tuple(WORDS[c] for c in SINGLE[1:] if c in step.verdict.silent and c in painting.dressed.can)
