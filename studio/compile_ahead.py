@@ -99,6 +99,7 @@ def work(program: Headless) -> None:
     ErrorMeter(services)(pipeline, first[-1], Job("measuring ahead"))
     pipeline.complete(first[-1], Job("completing ahead"))
     _bounce(program, first[-1])
+    _stroke(program, first[0])
 
 
 def _bounce(program: Headless, frame: Any) -> None:
@@ -133,6 +134,26 @@ def _bounce_in_hand(frame: Any, services: Any, backend: Any, params: Any, gather
     scene = Move({group.id: Transform((0.1, 0.0, 0.05)) @ group.transform})(frame.scene)
     moved = dataclasses.replace(still, scene=scene)
     pipeline.update(moved, diff(frame.scene, scene), Job("compiling ahead"))
+
+
+def _stroke(program: Headless, frame: Any) -> None:
+    """A stroke on the picture, and the painted scene."""
+    from studio_core.shading.job import Job
+    from studio_core.shading.offline import backend_params
+    from studio_core.strokes.brush import Brush
+    from studio_core.strokes.planned import Look, PaintedStroke
+    from studio_core.strokes.session import Easel, paint_and_solve
+    from studio_core.strokes.stroke import BRIGHTEN
+    from studio_core.strokes.tools import Gesture
+
+    solver = program.registry.get("solver", "joint")
+    backend = program.registry.get("backend", "reference")
+    services = dataclasses.replace(program.services, cache=None)
+    easel = Easel(backend, backend_params(backend, {"vertices": 1500, "directions": "1024"}), services)
+    gesture = Gesture.of(Brush(size=0.2), [(0.5, 0.5), (0.6, 0.6)])
+    planned = PaintedStroke(BRIGHTEN, gesture, look=Look(width=160, height=90))
+    made = paint_and_solve(frame.scene, [planned], solver, solver.Params(), easel, services)
+    easel.picture(made.scene, planned.look.view(made.scene), Job("compiling ahead"))
 
 
 def _embossed(scene: Any) -> Any:

@@ -50,7 +50,7 @@ def test_edits_find_their_kernels(program):
                 editor.go(moving, params, True)
             editor.go(base, params, False)
     assert any(module.endswith("cuts.glimpse") for module, _, _ in before)
-    assert {"add_relief", "add_tilts"} <= {name for _, name, _ in before}
+    assert {"add_relief", "add_tilts", "lay"} <= {name for _, name, _ in before}
     assert compiled() - before == set()
 
 
