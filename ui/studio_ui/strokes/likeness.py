@@ -24,7 +24,8 @@ from studio_ui.strokes.sheet import Placed
 F32 = npt.NDArray[np.float32]
 MOST = 300_000
 """Pixels of the pattern: more are not told apart."""
-CHECK = 5
+CHECKS = 110
+"""Down the picture, whatever pixels it has."""
 _STRONG, _WEAK = 0.75, 0.25
 _SHADED = Aspect.TRANSFORM | Aspect.STRUCTURE | Aspect.GEOMETRY
 
@@ -64,7 +65,8 @@ class Likeness(QObject):
             return Overlay()
         height, width = self._amount.shape
         rows, columns = np.indices((height, width))
-        check = np.where((rows // CHECK + columns // CHECK) % 2, _STRONG, _WEAK)
+        size = max(round(height / CHECKS), 1)
+        check = np.where((rows // size + columns // size) % 2, _STRONG, _WEAK)
         pixels = np.empty((height, width, 4), np.uint8)
         pixels[..., :3] = self._colour.red(), self._colour.green(), self._colour.blue()
         pixels[..., 3] = np.rint(255 * check * np.clip(self._amount, 0, 1))
