@@ -28,8 +28,7 @@ if TYPE_CHECKING:
     from studio_core.shading.coefficients import Maps
     from studio_core.shading.job import Job
     from studio_core.shading.reliefs import Reliefs
-    from studio_core.transport.bounces import Light as SentLight
-    from studio_core.transport.bounces import Surface
+    from studio_core.transport.exchange import Exchange
 
 Source: TypeAlias = tuple[NodeId, Geometry, tuple[MaterialId, ...]]
 """An object, its mesh, the material of each slot."""
@@ -330,7 +329,7 @@ class Indirect:
 
     `layer` has the gains of all lights in it; it holds where `valid`. `final` tells whether it is as exact as
     asked for. `counts` tells of the work, `facts` of the method, in the words of the field: numbers alone.
-    `sent` is what all vertices send, and how, where the method knows.
+    `sent` is what all vertices send, and what it was made from, where the method knows.
     """
 
     surfaces: Surfaces
@@ -339,7 +338,7 @@ class Indirect:
     final: bool
     counts: Mapping[str, int] = field(default_factory=dict)
     facts: Mapping[str, float] = field(default_factory=dict)
-    sent: tuple[SentLight, Surface] | None = None
+    sent: Exchange | None = None
 
 
 @dataclass(frozen=True)

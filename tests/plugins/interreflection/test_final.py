@@ -10,13 +10,12 @@ import pytest
 from studio_core.brdfs.calls import density, evaluate, sample
 from studio_core.params import defaults
 from studio_core.transport.hits import HitTable
+from studio_core.transport.lobes import draw_lobes, spread_numbers, used_share
 from studio_core.transport.patterns import cosine_pattern, variants_of
 from studio_plugins.brdfs.ggx import MODEL as GGX
 from studio_plugins.brdfs.lambert import MODEL as LAMBERT
 from studio_plugins.brdfs.phong import MODEL as PHONG
 from studio_plugins.interreflection.gather.final import add_flat_terms, gather_final
-from studio_plugins.interreflection.gather.lobe_rays import spread_numbers
-from studio_plugins.interreflection.gather.lobes import draw_lobes, used_share
 
 MODELS = {
     "phong 10": (PHONG, {"exponent": 10.0}),

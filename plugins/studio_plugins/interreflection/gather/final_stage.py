@@ -193,8 +193,7 @@ class FinalStage:
             "rounds": float(sent.sources.steps),
             "bytes": float(held + sent.nbytes + separated.nbytes + self._neighbours.nbytes),
         }
-        known = sent.sources.light, sent.surface
-        return Indirect(inputs[Surfaces], layer, wanted, tier.last, counts, facts, known)
+        return Indirect(inputs[Surfaces], layer, wanted, tier.last, counts, facts, sent.exchange)
 
 
 def _needed(vertices: I64, way: Facing) -> I64:

@@ -12,9 +12,9 @@ from studio_core.contract import Services
 from studio_core.scene.nodes import Scene
 from studio_core.shading.artifacts import Casters, Receivers, Shapes, Surfaces
 from studio_core.shading.job import Job
+from studio_core.transport.lobes import Lobes, LobeTable, draw_lobes, spread_numbers
 from studio_core.transport.operator import RayTransport
 from studio_core.transport.patterns import variants_of
-from studio_plugins.interreflection.gather.lobes import Lobes, LobeTable, draw_lobes
 
 F32 = npt.NDArray[np.float32]
 CHUNK = 1 << 8
@@ -124,14 +124,3 @@ class LobeRays:
         if key not in self._numbers:
             self._numbers[key] = spread_numbers(VARIANTS, terms, count, SEED)
         return self._numbers[key]
-
-
-def spread_numbers(variants: int, terms: int, count: int, seed: int) -> F32:
-    """(variants, terms, count, 2): points of the R2 sequence (Roberts 2018), each set shifted at random.
-
-    The first `n` of a set are evenly spread for every n.
-    """
-    steps = np.array([0.7548776662466927, 0.5698402909980532])
-    shift = np.random.default_rng(seed).random((variants, terms, 1, 2))
-    made = (shift + (np.arange(count) + 0.5)[:, None] * steps) % 1.0
-    return np.asarray(np.minimum(made, 1 - 2.0**-24), np.float32)

@@ -23,6 +23,7 @@ from studio_core.shading.job import Job
 from studio_core.shading.kept import Kept
 from studio_core.shading.pipeline import Inputs
 from studio_core.transport.bounces import Covered, Light, Sources, Surface, bounced, reflected
+from studio_core.transport.exchange import Exchange
 from studio_core.transport.light_samples import SampleCounts
 from studio_core.transport.reflectance import VertexCoefficients
 from studio_core.transport.separable import Separated, Separator
@@ -85,12 +86,21 @@ class Sent:
     worth (2^10,): of directions of the sky to the scene; None where there is no sky.
     """
 
-    sources: Sources
-    surface: Surface
+    exchange: Exchange
     rays: int
     nbytes: int
     tier: Tier
     worth: npt.NDArray[np.float64] | None = None
+
+    @property
+    def sources(self) -> Sources:
+        """What is sent."""
+        return self.exchange.sources
+
+    @property
+    def surface(self) -> Surface:
+        """How."""
+        return self.exchange.surface
 
 
 class SentStage:
@@ -150,7 +160,9 @@ class SentStage:
         if not inputs[Chosen].level:
             made = replace(made, before=None)
         nbytes = self._light.nbytes + made.light.matte.nbytes + made.light.functions.nbytes
-        return Sent(made, surface, counted.rays, nbytes, tier, self._light.sky.worth)
+        how = tier.lobe_error, tier.functions
+        known = Exchange(made, surface, shapes, met.tables, bounces, self._light, lights, how)
+        return Sent(known, counted.rays, nbytes, tier, self._light.sky.worth)
 
 
 def _covered(met: Meetings, surfaces: Surfaces, neighbours: npt.NDArray[np.int32]) -> Covered:

@@ -145,3 +145,14 @@ def draw_lobes(
                     along = axes[0, c] * x + axes[1, c] * y + axes[2, c] * z
                     directions[i, target, c] = along if z > 0.0 else 0.0
             turn += 1
+
+
+def spread_numbers(variants: int, terms: int, count: int, seed: int) -> F32:
+    """(variants, terms, count, 2): points of the R2 sequence (Roberts 2018), each set shifted at random.
+
+    The first `n` of a set are evenly spread for every n.
+    """
+    steps = np.array([0.7548776662466927, 0.5698402909980532])
+    shift = np.random.default_rng(seed).random((variants, terms, 1, 2))
+    made = (shift + (np.arange(count) + 0.5)[:, None] * steps) % 1.0
+    return np.asarray(np.minimum(made, 1 - 2.0**-24), np.float32)
