@@ -1,0 +1,249 @@
+"""How well one change of one region explains a stroke: all that may be changed, fitted exactly over grids.
+
+The change of light is quadratic in the coefficients of a material's terms, so a candidate costs a product
+with a small matrix (`Moments`); coefficients are asked of the model at a grid of values, whatever curve
+they follow.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from studio_plugins.slf.fixates import Rows
+from studio_plugins.slf.joint import NOISE, PLACES, TINTS_APART
+from studio_plugins.slf.ladder import LEVELS
+from studio_plugins.slf.changeable import DIFFUSE, GLOSS, SPECULAR, Look, Region
+from studio_plugins.slf.trials import Node
+
+F64 = npt.NDArray[np.float64]
+STEPS = 33
+"""Values of a parameter that are tried before the best is refined."""
+SIZE = 1.0
+"""What a change of a whole parameter's range costs in score: of two that explain alike, the smaller one."""
+PARTS = 8
+OTHER = 0.5
+"""Levels that are nearer to today's are no change of gloss."""
+LOOSE = np.linspace(0.92, 1.08, 9)
+"""Columns know how much light comes back in all at another gloss no better than that."""
+
+
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """One region's change: its meaning (`strokes.stroke.MEANINGS`), the look it starts from, values by role;
+    what it leaves of the wanted change (squared, relative), and the score, lower is better.
+    """
+
+    region: int
+    meaning: str
+    look: Look
+    values: Mapping[str, F64]
+    left: float
+    score: float
+
+    @property
+    def explained(self) -> float:
+        """1 − left."""
+        return 1 - self.left
+
+
+@dataclass(frozen=True, eq=False)
+class Moments:
+    """Of one region at L levels: left = rest + Σ_c Δ_cᵀ gram_c Δ_c − 2 Δ_c · light_c.
+
+    Δ (T, 3) are changes of coefficients; levels (L,); gram (L, 3, T, T), light (L, 3, T), rest (L, 3): relative to the region as it is.
+    """
+
+    levels: F64
+    gram: F64
+    light: F64
+    rest: F64
+
+    @classmethod
+    def of(cls, rows: Rows, nodes: list[Node], region: int, at: Sequence[Between]) -> Moments:
+        """At levels between nodes."""
+        width = max(node.columns.terms.shape[2] for node in nodes)
+        share = np.array([one.share for one in at])
+        first, second = [one.first for one in at], [one.second for one in at]
+        every = np.zeros((len(nodes), len(rows), width, 3))
+        for node, into in zip(nodes, every, strict=True):
+            into[:, : node.columns.terms.shape[2]] = node.columns.terms[:, region]
+        whole = np.stack([node.columns.whole[:, region] for node in nodes])
+        by = share[:, None, None, None]
+        terms = (1 - by) * every[first] + by * every[second]
+        sent = (1 - by[..., 0]) * whole[first] + by[..., 0] * whole[second]
+        importance, wanted = rows.importance, rows.change - (sent - whole[0])
+        weighed = (importance[:, None] * terms).transpose(0, 3, 2, 1)  # (L, 3, T, P)
+        gram = weighed @ terms.transpose(0, 3, 1, 2)
+        light = (weighed @ wanted.transpose(0, 2, 1)[..., None])[..., 0]
+        return cls(np.array([one.level for one in at]), gram, light, (importance * wanted**2).sum(axis=1))
+
+    def left(self, changes: F64) -> F64:
+        """(L, N, 3) of changes (N, T, 3) of coefficients."""
+        width = min(changes.shape[1], self.gram.shape[2])
+        by = changes[:, :width].transpose(2, 0, 1)  # (3, N, T)
+        square = ((by @ self.gram[:, :, :width, :width]) * by).sum(axis=3)
+        linear = (by @ self.light[:, :, :width, None])[..., 0]
+        return np.asarray((self.rest[..., None] + square - 2 * linear).transpose(0, 2, 1))
+
+
+class Between(NamedTuple):
+    """A level that lies between two nodes, `share` of the way to the second."""
+
+    level: float
+    first: int
+    second: int
+    share: float
+
+
+NOW = (Between(-1.0, 0, 0, 0.0),)
+
+
+def candidates(
+    rows: Rows, nodes: list[Node], regions: list[Region], allowed: frozenset[str]
+) -> list[Candidate]:
+    """The best change of each kind of each region, best first; `allowed` meanings."""
+    made: list[Candidate] = []
+    for number, region in enumerate(regions):
+        own = Moments.of(rows, nodes[:1], number, NOW)
+        found = [*_colours(number, region, own)]
+        if SPECULAR in region.now.roles:
+            found += _shine(number, region.now, own)
+        if GLOSS in region.full.roles and len(nodes) > 1:
+            found += _glosses(number, region, rows, nodes)
+        made += _best_of_each(one for one in found if one.meaning in allowed)
+    return sorted(made, key=lambda one: one.score)
+
+
+def _glosses(number: int, region: Region, rows: Rows, nodes: list[Node]) -> Iterator[Candidate]:
+    """Changes to levels other than today's, if the region shines at all today."""
+    full, at = region.full, _between(region, nodes)
+    if not at:
+        return
+    levels = Moments.of(rows, nodes, number, at)
+    if region.full is region.now and full.shiny:
+        left = _loosely(full, levels)
+        best = int(np.argmin(left))
+        level = float(levels.levels[best])
+        score = score_of(float(left[best]), 1, abs(level - full.level) / LEVELS)
+        yield Candidate(
+            number, "gloss", full, {GLOSS: np.asarray(full.gloss_at(level))}, float(left[best]), score
+        )
+    if SPECULAR in full.roles:
+        yield from _shine(number, full, levels)
+
+
+def _between(region: Region, nodes: list[Node]) -> list[Between]:
+    """Levels that are tried, each between two nodes: those with columns of their own, and PARTS between them.
+
+    A region whose model stays has a node at its own level as well; levels near that are no change.
+    """
+    known = [(node.level, number) for number, node in enumerate(nodes) if number]
+    own = region.full.level if region.full is region.now and region.full.shiny else -1.0
+    if own >= 0:
+        known = sorted([*known, (own, 0)])
+    made = []
+    for (low, one), (high, other) in itertools.pairwise(known):
+        for part in range(PARTS):
+            share = part / PARTS
+            made.append(Between(low + share * (high - low), one, other, share))
+    made.append(Between(known[-1][0], known[-1][1], known[-1][1], 0.0))
+    return [one for one in made if own < 0 or abs(one.level - own) > OTHER]
+
+
+def _best_of_each(found: Iterable[Candidate]) -> list[Candidate]:
+    best: dict[str, Candidate] = {}
+    for one in found:
+        if one.meaning not in best or one.score < best[one.meaning].score:
+            best[one.meaning] = one
+    return list(best.values())
+
+
+def score_of(left: float, numbers: int, size: float) -> float:
+    """See the module `joint`; and a little for the size of the change."""
+    return PLACES * math.log(max(left, 0) + NOISE**2) + numbers * math.log(PLACES) + SIZE * size
+
+
+def _colours(number: int, region: Region, own: Moments) -> Iterator[Candidate]:
+    look = region.now
+    if DIFFUSE not in look.roles or look.at(DIFFUSE).ndim == 0:
+        return
+    info, now = look.infos[look.roles[DIFFUSE]], look.at(DIFFUSE)
+    grid = np.linspace(info.low, info.high, STEPS)
+    left = own.left(look.coefficients({DIFFUSE: np.repeat(grid[:, None], 3, axis=1)}) - look.plain)[0]
+    value = np.array([_refined(grid, left[:, c]) for c in range(3)])
+    rest = float(own.left(look.coefficients({DIFFUSE: value[None]}) - look.plain).sum())
+    yield Candidate(number, "colour", look, {DIFFUSE: value}, rest, score_of(rest, 3, _size(value, now)))
+
+
+def _loosely(look: Look, levels: Moments) -> F64:
+    """(L,) what is left at levels with about as much shine as now."""
+    now = look.at(SPECULAR)
+    about = LOOSE if now.ndim == 0 else LOOSE[:, None]
+    left = levels.left(look.coefficients({SPECULAR: about * now}) - look.plain).sum(axis=2)
+    # Squared in the share, but for the curve of the model: the parabola through ends and middle.
+    middle = len(LOOSE) // 2
+    low, mid, high = left[:, 0], left[:, middle], left[:, -1]
+    slope, bend = (high - low) / 2, (high + low) / 2 - mid
+    at = np.where(bend > 0, np.clip(-slope / np.maximum(2 * bend, 1e-30), -1, 1), 0)
+    return np.asarray(np.minimum(mid + slope * at + bend * at**2, left.min(axis=1)))
+
+
+def _shine(number: int, look: Look, levels: Moments) -> Iterator[Candidate]:
+    """More or less shine: of its own colour or white, of any colour; another level is one number more."""
+    info, now = look.infos[look.roles[SPECULAR]], look.at(SPECULAR)
+    grid = info.low + (info.high - info.low) * np.linspace(0, 1, STEPS) ** 2
+    other = bool(levels.levels[0] >= 0)
+    meaning = "shine and gloss" if other and look.shiny else "shine"
+
+    def left(values: F64) -> F64:
+        return levels.left(look.coefficients({SPECULAR: values}) - look.plain)
+
+    def candidate(value: F64, level: int, numbers: int) -> Candidate:
+        rest = float(left(value[None])[level].sum())
+        at = float(levels.levels[level])
+        gloss = {GLOSS: np.asarray(look.gloss_at(at))} if other else {}
+        score = score_of(rest, numbers + other, _size(value, now))
+        return Candidate(number, meaning, look, {SPECULAR: value, **gloss}, rest, score)
+
+    if now.ndim == 0:
+        found = left(grid).sum(axis=2)
+        level = int(np.argmin(found.min(axis=1)))
+        yield candidate(np.asarray(_refined(grid, found[level])), level, 1)
+        return
+    tint = now / now.max() if now.max() > 0 else np.ones(3)
+    for colour in (tint, np.ones(3)):
+        if colour is not tint and np.abs(colour - tint).max() <= TINTS_APART:
+            continue
+        found = left(grid[:, None] * colour).sum(axis=2)
+        level = int(np.argmin(found.min(axis=1)))
+        yield candidate(_refined(grid, found[level]) * colour, level, 1 if colour is tint else 3)
+    each = left(np.repeat(grid[:, None], 3, axis=1))
+    level = int(np.argmin(each.min(axis=1).sum(axis=1)))
+    yield candidate(np.array([_refined(grid, each[level, :, c]) for c in range(3)]), level, 3)
+
+
+def _refined(grid: F64, left: F64) -> float:
+    """Where the parabola through the least of (N,) and its neighbours is least."""
+    best = int(np.argmin(left))
+    if best in (0, len(grid) - 1):
+        return float(grid[best])
+    (x, y, z), (a, b, c) = grid[best - 1 : best + 2], left[best - 1 : best + 2]
+    one, two = (b - a) / (y - x), (c - b) / (z - y)
+    bend = (two - one) / (z - x)
+    if bend <= 0:
+        return float(y)
+    return float(np.clip((x + y) / 2 - one / (2 * bend), x, z))
+
+
+def _size(value: F64, now: F64) -> float:
+    return float(np.sqrt(np.mean((value - now) ** 2)))
+
+
+__all__ = ["Candidate", "Moments", "candidates", "score_of"]

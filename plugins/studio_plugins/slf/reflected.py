@@ -1,0 +1,137 @@
+"""Strokes in indirect mode: the surface stays as it is, and what lights it or shows in it changes.
+
+Which material of which object changed, and what of it, is decided as in `joint`: every change is fitted as
+well as it can be, and pays for each number it changes. What the changes do is known by columns, the
+derivatives of the light under the stroke (`influence`, `further`); here they are put together and the edit
+is written.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from studio_core.contract import Services
+from studio_core.scene.nodes import NodeId, Scene
+from studio_core.shading.job import Job
+from studio_core.strokes.solution import Finding, Lit, Reason
+from studio_core.strokes.stroke import AUTOMATIC, FIXATE, MEANINGS, Stroke
+from studio_plugins.slf.candidates import Candidate, candidates, score_of
+from studio_plugins.slf.fixates import NOBODY, Rows, rows_of
+from studio_plugins.slf.influence import Sights
+from studio_plugins.slf.joint import CLOSE
+from studio_plugins.slf.recolouring import edit_of
+from studio_plugins.slf.changeable import Region, regions_of
+from studio_plugins.slf.trials import Trials
+
+F64 = npt.NDArray[np.float64]
+SHOWN = 4
+"""Objects that are told of."""
+
+
+@dataclass(frozen=True)
+class Reflections:
+    """Findings, best first: the first one's first reason explains the strokes best. Notes are sentences."""
+
+    findings: tuple[Finding, ...] = ()
+    notes: tuple[str, ...] = ()
+    counts: Mapping[str, int] = field(default_factory=dict)
+
+
+class Reflected:
+    """Remembers what rows under strokes see; owned by the compute thread."""
+
+    def __init__(self, services: Services) -> None:
+        self._services = services
+        self._sights = Sights(services)
+        self._trials = Trials(services)
+
+    def solve(
+        self,
+        scene: Scene,
+        strokes: Sequence[Stroke],
+        lit: Lit,
+        job: Job,
+        now: Mapping[NodeId, F64] | None = None,
+    ) -> Reflections:
+        """What explains the strokes, of which fixates tell what must stay; `now` as in `fixates.rows_of`."""
+        asked = [s for s in strokes if not s.hidden and (s.indirect or s.tool == FIXATE)]
+        known = None if lit.indirect is None else lit.indirect.sent
+        if known is None:
+            return Reflections(
+                notes=("Light does not go on between surfaces here: nothing lights the stroke.",)
+            )
+        surfaces = lit.surfaces.unrefined
+        covered = known.surface.covered
+        rows = rows_of(asked, surfaces, NOBODY if covered is None else covered.vertices, now)
+        if not len(rows) or not (rows.importance * rows.change**2).sum() > 0:
+            return Reflections(notes=("The stroke wants no change of what is reflected.",))
+        sight = self._sights.of(scene, surfaces, lit.casters, known, rows, job)
+        own = [(surfaces.nodes[i], s) for i, s in _under(rows, surfaces.mesh)]
+        regions, region = regions_of(scene, surfaces, own, self._services.registry)
+        if not regions:
+            return Reflections(notes=("Nothing whose material could change lights the stroke.",))
+        nodes = self._trials(scene, surfaces, known, rows, sight, regions, region, job)
+        pooled, share = rows.pooled(surfaces.mesh.positions)
+        found = candidates(pooled, [node.pooled(share) for node in nodes], regions, allowed(asked))
+        counts = {"rows": len(rows), "regions": len(regions), "rays": sight.traced, "candidates": len(found)}
+        return Reflections(self._findings(scene, asked, regions, found), (), counts)
+
+    def _findings(
+        self, scene: Scene, strokes: Sequence[Stroke], regions: list[Region], found: list[Candidate]
+    ) -> tuple[Finding, ...]:
+        nothing = score_of(1.0, 0, 0.0)
+        better = [one for one in found if one.score < nothing]
+        by_region: dict[int, list[Candidate]] = {}
+        for one in better:
+            by_region.setdefault(one.region, []).append(one)
+        close = sum(one.score - better[0].score < CLOSE for one in better[1:]) if better else 0
+        ids = tuple(stroke.id for stroke in strokes)
+        made: list[Finding] = []
+        for number, own in list(by_region.items())[:SHOWN]:
+            region = regions[number]
+            reasons = tuple(self._reason(scene, region, one) for one in own)
+            made.append(Finding(region.node, region.slot, ids, reasons, close if not made else 0))
+        return tuple(made)
+
+    def _reason(self, scene: Scene, region: Region, one: Candidate) -> Reason:
+        values: dict[str, float | tuple[float, float, float]] = {}
+        for role, value in one.values.items():
+            numbers = [float(v) for v in np.atleast_1d(value)]
+            name = one.look.roles[role]
+            values[name] = numbers[0] if len(numbers) == 1 else (numbers[0], numbers[1], numbers[2])
+        edit = edit_of(scene, region, one.look, one.values)
+        return Reason(one.meaning, one.explained, one.score, values, edit)
+
+
+def _under(rows: Rows, mesh: Any) -> set[tuple[int, int]]:
+    """Number of the object and slot under each row."""
+    made = set()
+    for vertex in np.unique(rows.vertex).tolist():
+        index = int(mesh.object[vertex])
+        slot = int(mesh.objects[index].mesh.slot[vertex - mesh.vertex_offsets[index]])
+        made.add((index, slot))
+    return made
+
+
+def allowed(strokes: Sequence[Stroke]) -> frozenset[str]:
+    """Meanings that all strokes allow."""
+    made = frozenset(MEANINGS)
+    for stroke in strokes:
+        if stroke.meaning != AUTOMATIC and stroke.tool != FIXATE:
+            made &= {stroke.meaning}
+    return made
+
+
+def solve_reflected(
+    scene: Scene, strokes: Sequence[Stroke], lit: Lit, services: Services, params: Any, job: Job
+) -> tuple[Finding, ...]:
+    """Findings of strokes in indirect mode, best first, by somebody who remembers nothing."""
+    return Reflected(services).solve(scene, strokes, lit, job).findings
+
+
+__all__ = ["Reflected", "Reflections", "allowed", "solve_reflected"]
