@@ -11,6 +11,9 @@ Light Field Manipulation and Reflectance Optimization", 2013).
 - where: `regions`, `elements` (points that stand for all surfaces)
 - how far: `looks`, `spots`, `similarity` (what is alike a stroke), `upsampling` (from elements to all else),
   `field` (the change that is wanted anywhere), `points` and `spread` (paint that has it)
+- what is reflected: `fixates` (what strokes in indirect mode ask for), `influence`, `further`, `receiving`
+  and `trials` (columns of what others send), `changeable` and `candidates` (what may have changed),
+  `recolouring` (the edit), `reflected` (the decision)
 - `solver`: the door
 - all elements at once: `links` (what they see), `lumitexels` and `series` (light of all directions), `lobes`,
   `skylight`, `straight`, `moments`, `mixed`, and `whole` above them

@@ -16,10 +16,10 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from studio_plugins.slf.changeable import DIFFUSE, GLOSS, SPECULAR, Look, Region
 from studio_plugins.slf.fixates import Rows
 from studio_plugins.slf.joint import NOISE, PLACES, TINTS_APART
 from studio_plugins.slf.ladder import LEVELS
-from studio_plugins.slf.changeable import DIFFUSE, GLOSS, SPECULAR, Look, Region
 from studio_plugins.slf.trials import Node
 
 F64 = npt.NDArray[np.float64]
@@ -55,9 +55,10 @@ class Candidate:
 
 @dataclass(frozen=True, eq=False)
 class Moments:
-    """Of one region at L levels: left = rest + Σ_c Δ_cᵀ gram_c Δ_c − 2 Δ_c · light_c.
+    """Of one region at L levels, relative to the region as it is.
 
-    Δ (T, 3) are changes of coefficients; levels (L,); gram (L, 3, T, T), light (L, 3, T), rest (L, 3): relative to the region as it is.
+    left = rest + Σ_c Δ_cᵀ gram_c Δ_c − 2 Δ_c · light_c, with Δ (T, 3) changes of coefficients; levels (L,),
+    gram (L, 3, T, T), light (L, 3, T), rest (L, 3).
     """
 
     levels: F64

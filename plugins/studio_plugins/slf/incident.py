@@ -79,7 +79,7 @@ class Incident:
         light = np.zeros((*met.shape, 3), np.float32)
         known = met < len(mesh)
         if lit.indirect is not None and lit.indirect.sent is not None:
-            sent, surface = lit.indirect.sent
+            sent, surface = lit.indirect.sent.light, lit.indirect.sent.surface
             hit, from_ = met[known].astype(np.int64), cell[known].astype(np.int64)
             light[known] = sent_towards(sent, surface, hit, from_, self._workers, None)
         normal, tangent = mesh.normals[vertices], mesh.tangents[vertices]

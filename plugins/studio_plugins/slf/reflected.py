@@ -21,11 +21,11 @@ from studio_core.shading.job import Job
 from studio_core.strokes.solution import Finding, Lit, Reason
 from studio_core.strokes.stroke import AUTOMATIC, FIXATE, MEANINGS, Stroke
 from studio_plugins.slf.candidates import Candidate, candidates, score_of
+from studio_plugins.slf.changeable import Region, regions_of
 from studio_plugins.slf.fixates import NOBODY, Rows, rows_of
 from studio_plugins.slf.influence import Sights
 from studio_plugins.slf.joint import CLOSE
 from studio_plugins.slf.recolouring import edit_of
-from studio_plugins.slf.changeable import Region, regions_of
 from studio_plugins.slf.trials import Trials
 
 F64 = npt.NDArray[np.float64]

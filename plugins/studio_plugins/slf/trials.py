@@ -16,11 +16,11 @@ from studio_core.strokes.paintable import paintable
 from studio_core.transport.exchange import Exchange
 from studio_core.transport.reflectance import VertexCoefficients
 from studio_core.transport.separable import Separator
+from studio_plugins.slf.changeable import GLOSS, Region
 from studio_plugins.slf.fixates import Rows
 from studio_plugins.slf.further import Importance, term_albedos
 from studio_plugins.slf.influence import Columns, Sight, columns
 from studio_plugins.slf.receiving import Arrivals
-from studio_plugins.slf.changeable import GLOSS, Region
 
 F32 = npt.NDArray[np.float32]
 I32 = npt.NDArray[np.int32]

@@ -14,12 +14,12 @@ from studio_core.scene.nodes import AreaLamp, Camera, Material
 from studio_core.scene.transform import looking
 from studio_core.shading.artifacts import Casters, Surfaces
 from studio_core.transport.bounces import sent_towards
+from studio_plugins.slf.changeable import Look, regions_of
 from studio_plugins.slf.fixates import Rows, rows_of
 from studio_plugins.slf.further import Importance, carry_back, groups_of, spread_first, sum_regions
 from studio_plugins.slf.influence import Sight, add_columns
 from studio_plugins.slf.ladder import level_of_alpha
 from studio_plugins.slf.receiving import Arrivals, add_received
-from studio_plugins.slf.changeable import Look, regions_of
 from studio_plugins.slf.trials import TRIED
 
 LAMP = AreaLamp(

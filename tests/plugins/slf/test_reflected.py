@@ -17,9 +17,9 @@ from studio_core.scene.transform import looking
 from studio_core.shading.artifacts import Surfaces
 from studio_core.strokes.solution import Lit
 from studio_plugins.slf.candidates import STEPS, Moments, _refined
+from studio_plugins.slf.changeable import Look, mean_paint, regions_of
 from studio_plugins.slf.recolouring import painted_alike
 from studio_plugins.slf.reflected import solve_reflected
-from studio_plugins.slf.changeable import Look, mean_paint, regions_of
 
 LAMP = AreaLamp(
     id="lamp", intensity=6.0, width=1.0, height=0.6, transform=looking((0.8, 2.4, 0.9), (-0.5, 0, -0.5))
