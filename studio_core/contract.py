@@ -321,6 +321,10 @@ class StrokeRun(Protocol):
         """
         ...
 
+    def stylise(self, scene: Scene, amount: float, lit: Lit, job: Job) -> Solution:
+        """Paint on all objects under which the light of the scene is sharpened (figure 22) by an amount."""
+        ...
+
     def likeness(self, scene: Scene, stroke: NodeId, lit: Lit, params: Any, job: Job) -> Any:
         """(V,) float32, 0 … 1: how much each vertex of `lit.surfaces.unrefined` would change with it."""
         ...

@@ -92,9 +92,12 @@ class Painting:
 
     def solve(self, *strokes: Stroke) -> Reflections:
         """What explains them."""
+        return self.solver.solve(self.scene, strokes, self.given(), JOB)
+
+    def given(self) -> Lit:
+        """As solvers get it."""
         handed = self.room.handed()
-        lit = Lit(*(handed[kind] for kind in list(handed)[:4]), None, self.lit)  # type: ignore[arg-type]
-        return self.solver.solve(self.scene, strokes, lit, JOB)
+        return Lit(*(handed[kind] for kind in list(handed)[:4]), None, self.lit)  # type: ignore[arg-type]
 
     def become(self, scene: Scene) -> None:
         """From now on another scene."""

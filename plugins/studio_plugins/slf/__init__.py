@@ -14,7 +14,7 @@ Light Field Manipulation and Reflectance Optimization", 2013).
 - what is reflected: `fixates` (what strokes in indirect mode ask for), `influence`, `further`, `receiving`
   and `trials` (columns of what others send), `changeable` and `candidates` (what may have changed),
   `recolouring` (the edit), `reflected` (the decision)
-- `solver`: the door
+- `explaining` (one decision), `outcome` (the edit, and why), `solver` (the door)
 - all elements at once: `links` (what they see), `lumitexels` and `series` (light of all directions), `lobes`,
   `skylight`, `straight`, `moments`, `mixed`, and `whole` above them
 - to be seen: `appearance`, `splatting`, `backend`; the whole scene sharpened: `stylise`

@@ -41,6 +41,18 @@ def regions_of(stroke: Stroke) -> tuple[Region, ...]:
     )
 
 
+def touched(scene: Scene, strokes: Sequence[Stroke]) -> tuple[Region, ...]:
+    """All that is painted on objects on which one of the strokes wants a change: paint is an object's."""
+    nodes = {region.node for stroke in strokes if _wants(stroke) for region in regions_of(stroke)}
+    every = [*strokes, *scene.of(Stroke)]
+    found = (region for stroke in every if _wants(stroke) for region in regions_of(stroke))
+    return tuple(dict.fromkeys(region for region in found if region.node in nodes))
+
+
+def _wants(stroke: Stroke) -> bool:
+    return not stroke.indirect and stroke.tool != FIXATE
+
+
 def steps(scene: Scene, regions: Sequence[Region]) -> Mapping[Region, tuple[tuple[Stroke, ...], ...]]:
     """For each region the strokes on it that count, those that are explained together side by side.
 
@@ -63,4 +75,4 @@ def steps(scene: Scene, regions: Sequence[Region]) -> Mapping[Region, tuple[tupl
     return {region: tuple((*step, *kept[region]) for step in found) for region, found in made.items()}
 
 
-__all__ = ["Region", "regions_of", "steps"]
+__all__ = ["Region", "regions_of", "steps", "touched"]

@@ -6,6 +6,7 @@ is what was wanted.
 
 from __future__ import annotations
 
+import dataclasses
 from typing import Any
 
 import numpy as np
@@ -17,7 +18,10 @@ from scenes import floor
 from studio_core.contract import Services
 from studio_core.scene.nodes import AreaLamp, Camera, Material, MeshObject, Scene, SpotLamp
 from studio_core.scene.transform import Transform, axis_angle, looking
+from studio_core.shading.job import Job
+from studio_core.strokes.edits import bared
 from studio_plugins.slf.reflected import Reflections
+from studio_plugins.slf.solver import SOLVER, Params
 
 LAMP = AreaLamp(
     id="lamp", intensity=6.0, width=1.0, height=0.6, transform=looking((0.8, 2.4, 0.9), (-0.5, 0, -0.5))
@@ -25,6 +29,7 @@ LAMP = AreaLamp(
 CAMERA = Camera(id="camera", transform=looking((0, 2.2, 4.5), (0, 0.8, 0)))
 MATTE = {"base_color": (0.7, 0.7, 0.7)}
 NOISE = 0.1
+JOB = Job("test")
 
 
 @pytest.fixture(scope="module")
@@ -57,6 +62,29 @@ def test_figure_17_green_light_comes_from_a_wall(services: Services) -> None:
     left, mean = left_after(painting, found, some, change)
     assert left < 0.03
     np.testing.assert_allclose(mean, change.mean(axis=0), rtol=0.15)
+
+
+def test_through_the_door_it_is_one_edit_that_is_not_made_twice(services: Services) -> None:
+    painting = Painting(separate(furnished((LAMP, CAMERA))), services)
+    some = painting.vertices("floor", (-1.4, 0, 0.3), 150)
+    before = painting.radiance(painting.lit, some)
+    change = painting.after(recoloured(painting.scene, "side", base_color=(0.2, 0.75, 0.25)), some) - before
+    stroke = painting.stroke(some, before + change)
+    there, run = painting.scene.with_nodes(stroke), SOLVER.open(services)
+    solution = run.solve(there, [stroke.id], painting.given(), Params(), JOB)
+    best = solution.findings[0]
+    assert (best.node, best.reasons[0].meaning) == ("side", "colour")
+    made = solution.edit(there)
+    assert made["floor"].paint is None
+    (once,) = np.unique(made["side"].paint.change("base_color"), axis=0)
+    np.testing.assert_allclose(0.7 + once, (0.2, 0.75, 0.25), atol=0.06)
+    assert made[stroke.id].reached == ("side",)
+    again = run.solve(made, [stroke.id], painting.given(), Params(), JOB).edit(made)
+    (twice,) = np.unique(again["side"].paint.change("base_color"), axis=0)
+    np.testing.assert_allclose(twice, once, atol=0.02)
+    assert best.reasons[0].edit(there)[stroke.id].meaning == "colour"
+    off = made.with_nodes(dataclasses.replace(made[stroke.id], hidden=True))
+    assert "side" in bared(made, off)
 
 
 def test_figure_17_a_flat_stroke_makes_the_light_as_green(services: Services) -> None:

@@ -1,0 +1,163 @@
+"""One decision about a slot of an object: what its strokes say together, and what may be changed."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from studio_core.contract import Services
+from studio_core.scene.nodes import Material, NodeId
+from studio_core.strokes.paintable import paintable
+from studio_core.strokes.stroke import AUTOMATIC, FIXATE, Stroke
+from studio_plugins.slf.dressed import Dressed
+from studio_plugins.slf.joint import SINGLE, Change, Verdict
+from studio_plugins.slf.places import Places
+from studio_plugins.slf.regions import Region
+from studio_plugins.slf.samples import F64, Reflectance, Samples
+
+WORDS: Mapping[Change, str] = {
+    Change.NONE: "",
+    Change.DIFFUSE: "colour",
+    Change.SPECULAR: "shine",
+    Change.GLOSS: "gloss",
+    Change.DIFFUSE | Change.SPECULAR: "colour and shine",
+    Change.DIFFUSE | Change.GLOSS: "colour and gloss",
+    Change.SPECULAR | Change.GLOSS: "shine and gloss",
+    Change.DIFFUSE | Change.SPECULAR | Change.GLOSS: "everything",
+}
+MEANT = {word: change for change, word in WORDS.items()}
+STRANGE = 0.15
+"""Relative error of a place's light as it is, from which on it says little of how it would change."""
+
+
+@dataclass(frozen=True, eq=False)
+class Step:
+    """One decision: what was found, and what each explanation adds to the material's parameters."""
+
+    strokes: tuple[Stroke, ...]
+    verdict: Verdict
+    now: Reflectance
+    gloss: float | None
+    places: int
+
+
+@dataclass(eq=False)
+class Painting:
+    """A region on the way: its material as it can be painted, and what was decided so far."""
+
+    dressed: Dressed
+    was: Material
+    steps: list[Step]
+    changes: dict[str, F64]
+    offsets: dict[NodeId, list[tuple[npt.NDArray[np.int64], F64]]]
+    rays: int = 0
+
+    @staticmethod
+    def begin(material: Material, services: Services) -> Painting | None:
+        """Of a bare material; None where nothing of it can be painted."""
+        dressed = Dressed.of(paintable(material, services.registry), services.registry)
+        return None if dressed is None else Painting(dressed, material, [], {}, {})
+
+    def take(self, step: Step) -> None:
+        """Goes on from its best explanation."""
+        self.steps.append(step)
+        best = step.verdict.best
+        for name, change in self.dressed.changes(step.now, step.gloss, best.reflectance, best.change).items():
+            self.changes[name] = self.changes.get(name, np.zeros_like(change)) + change
+
+
+def on_region(stroke: Stroke, places: Places, region: Region) -> npt.NDArray[np.bool_]:
+    """(N,) which of a stroke's places lie on a region."""
+    assert stroke.marks is not None
+    node = np.array([name == region.node for name in stroke.objects], np.bool_)
+    made: npt.NDArray[np.bool_] = node[stroke.marks.object[places.mark]] & (places.slot == region.slot)
+    return made
+
+
+def samples_of(
+    stroke: Stroke, places: Places, sums: F64, dressed: Dressed, now: Reflectance
+) -> tuple[Samples, F64]:
+    """What a stroke says, its targets as the model would make them; and the offsets (N, 3)."""
+    assert stroke.marks is not None
+    marks = stroke.marks.some(places.mark)
+    shown, wanted = marks.shown.astype(np.float64), marks.wanted.astype(np.float64)
+    if stroke.tool == FIXATE:
+        wanted = shown
+    coefficients = dressed.coefficients(now.diffuse, now.specular)
+    before = np.einsum("ntc,tc->nc", sums[-1], coefficients)
+    known = np.isfinite(marks.offset).all(axis=1, keepdims=True)
+    offset = np.where(known, marks.offset, shown - before)
+    weight = marks.weight.astype(np.float64) * stroke.weight * _trust(offset, shown, before)
+    return Samples(wanted - offset, before, sums[:-1], sums[-1], weight), offset
+
+
+def _trust(offset: F64, shown: F64, before: F64) -> F64:
+    """(N,) how well the model knows the light of a place: 1 / (1 + (its relative error / STRANGE)²)²."""
+    error = np.abs(offset).mean(axis=1)
+    light = np.maximum(np.abs(shown), np.abs(before)).mean(axis=1)
+    relative = error / np.maximum(light, 1e-30)
+    return np.asarray(1 / (1 + (relative / STRANGE) ** 2) ** 2)
+
+
+def pooled_of(parts: Sequence[tuple[Stroke, Samples, Places]]) -> Samples:
+    """All samples; of a stroke in one flat colour its mean, and what lies beside it as it is."""
+    made: Samples | None = None
+    for stroke, samples, places in parts:
+        one = samples
+        if stroke.flat and stroke.tool != FIXATE and stroke.marks is not None:
+            marks = stroke.marks.some(places.mark)
+            painted = np.not_equal(marks.wanted, marks.shown).any(axis=1)
+            one = samples.some(np.flatnonzero(painted)).mean() + samples.some(np.flatnonzero(~painted))
+        made = one if made is None else made + one
+    assert made is not None
+    return made
+
+
+def allowed_of(dressed: Dressed, strokes: Sequence[Stroke]) -> tuple[Change, ...]:
+    """What may change: single changes for flat strokes and what somebody chose, else all that there is."""
+    painted = [stroke for stroke in strokes if stroke.tool != FIXATE]
+    if painted and all(stroke.flat for stroke in painted):
+        some = (*SINGLE, *(MEANT[stroke.meaning] for stroke in painted if stroke.meaning != AUTOMATIC))
+        return tuple(change for change in dict.fromkeys(some) if change & dressed.can == change)
+    return dressed.allowed
+
+
+def meant_first(verdict: Verdict, dressed: Dressed, strokes: Sequence[Stroke]) -> Verdict:
+    """With what somebody chose as the first explanation."""
+    for stroke in strokes:
+        if stroke.meaning == AUTOMATIC:
+            continue
+        chosen = [one for one in verdict.explanations if one.change == MEANT[stroke.meaning] & dressed.can]
+        others = [one for one in verdict.explanations if one not in chosen]
+        return dataclasses.replace(verdict, explanations=(*chosen, *others))
+    return verdict
+
+
+def tints_of(samples: Samples, dressed: Dressed, now: Reflectance) -> tuple[F64, ...]:
+    """White, and the colour in which the shine would have what was painted."""
+    more = samples.wanted - samples.before
+    full = Reflectance(now.diffuse, np.ones(3), now.level)
+    none = Reflectance(now.diffuse, np.zeros(3), now.level)
+    shine = samples.made(dressed, full, own=True) - samples.made(dressed, none, own=True)
+    weight = samples.weight[:, None]
+    colour = (weight * shine * more).sum(axis=0) / np.maximum((weight * shine**2).sum(axis=0), 1e-30)
+    colour = np.clip(colour + now.specular, 0, None)
+    return (np.ones(3), colour) if colour.max() > 0 else (np.ones(3),)
+
+
+__all__ = [
+    "MEANT",
+    "WORDS",
+    "Painting",
+    "Step",
+    "allowed_of",
+    "meant_first",
+    "on_region",
+    "pooled_of",
+    "samples_of",
+    "tints_of",
+]
