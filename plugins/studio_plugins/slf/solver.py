@@ -121,8 +121,8 @@ class JointRun:
     ) -> Solution:
         """With strokes that change what lights or shows in their places.
 
-        What they changed before is taken back first, if it is not gone with paint that is `remade`; of several,
-        those that were explained already stay.
+        What they changed before is taken back first, if it is not gone with paint that is `remade`; of
+        several, those that were explained already stay.
         """
         lost = [stroke for stroke in far if stroke.reached and not remade.isdisjoint(stroke.reached)]
         new = [stroke for stroke in far if not stroke.reached] + lost or [*far]
