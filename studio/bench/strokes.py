@@ -12,7 +12,11 @@ from studio.bench.harness import Report
 from studio.headless import Headless
 
 IN_PARTS = True
-PARTS = (("studio.bench.strokes_recovery", "run"), ("studio.bench.strokes_spread", "upsampling"))
+PARTS = (
+    ("studio.bench.strokes_recovery", "run"),
+    ("studio.bench.strokes_size", "run"),
+    ("studio.bench.strokes_spread", "upsampling"),
+)
 
 
 def run(report: Report, program: Headless) -> None:

@@ -104,7 +104,7 @@ def add_sums(
         k += 1
     most = cells + lamps + cells * parts * parts
     x, y, z = np.empty(most, np.float32), np.empty(most, np.float32), np.empty(most, np.float32)
-    weight = np.empty((most, 3), np.float32)
+    weight = np.empty((3, most), np.float32)
     wi, values = np.empty(3 * most, np.float32), np.empty(terms * most, np.float32)
     near = np.empty(cells, np.bool_)
     turn = np.empty((3, 3))
@@ -135,7 +135,7 @@ def add_sums(
             z[at] = turn[2, 0] * px + turn[2, 1] * py + turn[2, 2] * pz
             scale = np.float32(solid) * max(z[at], np.float32(0))
             for c in range(3):
-                weight[at, c] = light[row, cell, c] * scale
+                weight[c, at] = light[row, cell, c] * scale
             if near[cell]:
                 first += 1
             else:
@@ -147,7 +147,7 @@ def add_sums(
             y[at] = axes[n, 1, 0] * lx + axes[n, 1, 1] * ly + axes[n, 1, 2] * lz
             z[at] = axes[n, 2, 0] * lx + axes[n, 2, 1] * ly + axes[n, 2, 2] * lz
             for channel in range(3):
-                weight[at, channel] = strength[n, c, channel] * max(z[at], np.float32(0))
+                weight[channel, at] = strength[n, c, channel] * max(z[at], np.float32(0))
             at += 1
         fine = np.float32(solid / (parts * parts))
         for cell in range(cells):
@@ -173,25 +173,29 @@ def add_sums(
                     wz = row_axes[row, 0, 2] * px + row_axes[row, 1, 2] * py + row_axes[row, 2, 2] * pz
                     leaf = leaf_of(np.float32(wx), np.float32(wy), np.float32(wz), k)
                     for c in range(3):
-                        weight[at, c] = sky[leaf, c] * scale
+                        weight[c, at] = sky[leaf, c] * scale
                 else:
                     for c in range(3):
-                        weight[at, c] = light[row, cell, c] * scale
+                        weight[c, at] = light[row, cell, c] * scale
                 at += 1
         for level in range(len(shapes)):
             begin = close if sharp[level] else 0
             end = at if sharp[level] else cells + lamps
             count = end - begin
-            for i in range(count):
-                wi[i], wi[count + i], wi[2 * count + i] = x[begin + i], y[begin + i], z[begin + i]
+            wi[:count], wi[count : 2 * count], wi[2 * count : 3 * count] = (
+                x[begin:end],
+                y[begin:end],
+                z[begin:end],
+            )
             call_address(address, shapes[level], wo[n], count, wi, values)
+            reds, greens, blues = weight[0, begin:end], weight[1, begin:end], weight[2, begin:end]
             for term in range(terms):
-                red, green, blue = 0.0, 0.0, 0.0
+                value = values[term * count : (term + 1) * count]
+                red, green, blue = np.float32(0), np.float32(0), np.float32(0)
                 for i in range(count):
-                    value = values[term * count + i]
-                    red += value * weight[begin + i, 0]
-                    green += value * weight[begin + i, 1]
-                    blue += value * weight[begin + i, 2]
+                    red += value[i] * reds[i]
+                    green += value[i] * greens[i]
+                    blue += value[i] * blues[i]
                 out[level, n, term, 0], out[level, n, term, 1], out[level, n, term, 2] = red, green, blue
 
 
