@@ -20,7 +20,7 @@ from studio_core.shading.job import Job
 
 if TYPE_CHECKING:
     from studio_core.strokes.planned import Planned
-    from studio_core.strokes.solution import Finding
+    from studio_core.strokes.solution import Finding, Solution
 
 
 class Stroking(ABC):
@@ -97,15 +97,39 @@ class Stroking(ABC):
 
         return self._paint(strokes_from_file(Path(path)), solver, one_by_one)
 
-    def _paint(self, planned: Sequence[Planned], solver: str, one_by_one: bool) -> tuple[Finding, ...]:
+    def stylise(self, amount: float = 1.0, solver: str = "joint") -> None:
+        """Paint all objects so that the scene's light is sharpened, or with a negative amount smoothed."""
+        from studio_core.strokes.session import KIND, Easel
+
+        scene, view, services = self.scene, self._session.view, self._services()
+
+        def work(job: Job) -> Solution:
+            chosen, (backend, params, choice) = self._registry.get(KIND, solver), self._shaded_by()
+            easel = Easel(backend, params, services, choice)
+            easel.picture(scene, view, job)
+            made: Solution = chosen.open(services).stylise(scene, amount, easel.lit(), job)
+            return made
+
+        solution: Solution = self._run("Stylising", work)
+        self._document.apply(solution.edit)
+        for note in solution.notes:
+            print(note)
+
+    def _shaded_by(self) -> tuple[Any, Any, Any]:
+        """The session's backend with its parameters, and how light goes on between surfaces."""
         from studio_core.shading.offline import backend_params, session_choice
+
+        session, registry = self._session, self._registry
+        backend = registry.get("backend", session.backend)
+        return backend, backend_params(backend, session.params), session_choice(session, registry)
+
+    def _paint(self, planned: Sequence[Planned], solver: str, one_by_one: bool) -> tuple[Finding, ...]:
         from studio_core.strokes.session import KIND, Easel, Painted, paint_and_solve
 
-        scene, session, registry, services = self.scene, self._session, self._registry, self._services()
+        scene, services = self.scene, self._services()
 
         def work(job: Job) -> Painted:
-            backend, chosen = registry.get("backend", session.backend), registry.get(KIND, solver)
-            params, choice = backend_params(backend, session.params), session_choice(session, registry)
+            chosen, (backend, params, choice) = self._registry.get(KIND, solver), self._shaded_by()
             easel = Easel(backend, params, services, choice)
             given = (scene, planned, chosen, chosen.Params(), easel, services, job)
             return paint_and_solve(*given, one_by_one=one_by_one)

@@ -11,7 +11,7 @@ from scenes import little_scene
 from studio_core.contract import Services
 from studio_core.document import Document
 from studio_core.errors import EditError, InputError
-from studio_core.scene.nodes import Camera
+from studio_core.scene.nodes import Camera, MeshObject
 from studio_core.scripting import Names
 from studio_core.session import Session, View
 from studio_core.strokes.stroke import Stroke
@@ -74,3 +74,14 @@ def test_the_background_is_said(names, capsys):
 def test_mistakes_are_told(names, values, error, words):
     with pytest.raises(error, match=words):
         names.paint(**{"path": CUBE, "size": SIZE} | values)
+
+
+def test_a_scene_is_sharpened_in_one_step(names):
+    before = names.scene
+    names.stylise(1.0)
+    painted = [node.id for node in names.scene.of(MeshObject) if node.paint is not None]
+    assert painted
+    (_, step) = names.namespace["document"].history
+    assert step.label == "Stylise"
+    names.undo()
+    assert names.scene is before

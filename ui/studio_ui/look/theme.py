@@ -107,7 +107,7 @@ QToolButton[role="fold"]:checked { background: transparent; color: $text; }
 QDockWidget { color: $dim; font-weight: 600; }
 QDockWidget::title { background: $window; padding: 6px 8px; border-bottom: 1px solid $border; }
 QTabBar { qproperty-drawBase: 0; }
-QTabBar::tab { background: transparent; color: $dim; padding: 5px 8px; border: none;
+QTabBar::tab { background: transparent; color: $dim; padding: 5px 7px; border: none;
                border-bottom: 2px solid transparent; }
 QTabBar::tab:selected { color: $text; border-bottom-color: $accent; }
 QTabBar::tab:hover { color: $text; }

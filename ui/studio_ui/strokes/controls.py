@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import dataclasses
+from contextlib import suppress
 
 from PySide6.QtCore import QSignalBlocker, QTimer
+from PySide6.QtGui import QPaintEvent
 from PySide6.QtWidgets import (
     QButtonGroup,
     QCheckBox,
@@ -16,6 +18,7 @@ from PySide6.QtWidgets import (
 )
 
 from studio_core.edits import Remove, SetFields
+from studio_core.errors import LucarneError
 from studio_core.params import Value, param_infos
 from studio_core.scene.diff import Changes
 from studio_core.scene.nodes import NodeId, Scene
@@ -106,8 +109,8 @@ class StrokeControls(QWidget):
             self._context.document.changed.connect(self._edited),
             self._context.session.displayed.connect(self._show_brush),
         )
+        self._seen: QTimer | None = None
         self._show_brush()
-        self._offer_solvers()
         self.refresh()
 
     def set_theme(self, theme: Theme) -> None:
@@ -149,9 +152,19 @@ class StrokeControls(QWidget):
             self.brush.show_row(name, name in _OF_TOOL.get(now.tool, ()))
         self.brush.show_values(self._desk.store.values())
 
+    def paintEvent(self, event: QPaintEvent) -> None:
+        """Solvers are asked for their names once somebody sees this: to ask loads them."""
+        super().paintEvent(event)
+        if self._seen is None:
+            self._seen = QTimer(self, singleShot=True, interval=0)
+            self._seen.timeout.connect(self._offer_solvers)
+            self._seen.start()
+
     def _offer_solvers(self) -> None:
-        host = self._context.host
-        known = [(name, host.get("solver", name).label) for name in host.names("solver")]
+        host, known = self._context.host, []
+        for name in host.names("solver"):
+            with suppress(LucarneError):  # told under Help ▸ Plugins
+                known.append((name, str(getattr(host.get("solver", name), "label", name))))
         with QSignalBlocker(self.solver):
             for name, label in known:
                 self.solver.addItem(label, name)
