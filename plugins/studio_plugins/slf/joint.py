@@ -27,8 +27,6 @@ from studio_plugins.slf.samples import F64, Model, Reflectance, Samples
 PLACES = 30.0  # n_eff
 NOISE = 0.05
 """What is painted is meant no more exactly than that."""
-BLUNT = 0.0
-"""Of a change, by how much light that is computed from kept rays may be off."""
 CLOSE = 2.0 * math.log(PLACES)
 """Explanations whose scores are nearer than that to the best one's are shown beside it."""
 TOLD = 0.02
@@ -112,7 +110,6 @@ def decide(
         return Verdict((nothing,), Change.DIFFUSE | Change.SPECULAR | Change.GLOSS)
     importance = samples.importance
     before = float((importance * (samples.before - samples.wanted) ** 2).sum() / total)
-    unsure = NOISE**2 + BLUNT**2 * before
     every = Grams.of(samples, half_levels(samples.levels), importance)
     here = Grams.of(samples, np.array([now.level]), importance, samples.own[None])
     others = every.some(np.flatnonzero(np.abs(every.levels - now.level) > APART))
@@ -129,7 +126,7 @@ def decide(
             ]
         for one, extra in found:
             left = one.left / total
-            score = PLACES * math.log(left + unsure) + (change.cost + extra) * math.log(PLACES)
+            score = PLACES * math.log(left + NOISE**2) + (change.cost + extra) * math.log(PLACES)
             explained = 1 - left / before if before > 0 else 0.0
             made.append(Explanation(change, one.reflectance, left, score, explained))
     best: dict[Change, Explanation] = {}
