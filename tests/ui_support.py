@@ -10,7 +10,9 @@ from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
-from PySide6.QtCore import QPoint, Qt
+from PySide6.QtCore import QEvent, QPoint, QPointF, Qt
+from PySide6.QtGui import QMouseEvent
+from PySide6.QtWidgets import QApplication, QWidget
 from pytestqt.qtbot import QtBot
 
 from studio.app import Studio
@@ -245,6 +247,18 @@ class Answers:
         return self.target
 
 
+def move_mouse(widget: QWidget, at: QPoint) -> None:
+    """Move the mouse over a widget, with the buttons and keys that are held.
+
+    Qt's own way moves the cursor, and without a display the first window that was ever shown there hears it.
+    """
+    place, buttons = QPointF(at), QApplication.mouseButtons()
+    keys, none = QApplication.keyboardModifiers(), Qt.MouseButton.NoButton
+    event = QMouseEvent(QEvent.Type.MouseMove, place, widget.mapToGlobal(place), none, buttons, keys)
+    QApplication.sendEvent(widget, event)
+    QApplication.processEvents()
+
+
 class Driver:
     """A studio under test: what a person would do with it."""
 
@@ -257,7 +271,7 @@ class Driver:
             self.context.feed,
         )
         self._closed = False
-        self.patience = 20_000  # milliseconds
+        self.patience = 60_000  # milliseconds: other programs may keep the processors busy
         self.window.resize(1100, 700)
         self.window.show()
 
@@ -306,7 +320,7 @@ class Driver:
         self.bot.mousePress(self.viewport, button or Qt.MouseButton.LeftButton, keys, at)
 
     def move(self, at: QPoint) -> None:
-        self.bot.mouseMove(self.viewport, at)
+        move_mouse(self.viewport, at)
 
     def release(
         self, at: QPoint, keys: Qt.KeyboardModifier = Qt.KeyboardModifier.NoModifier, button: Any = None
@@ -315,7 +329,7 @@ class Driver:
 
     def do(self, action: str) -> None:
         """Trigger an action as its menu does."""
-        self.bot.waitUntil(lambda: not self.window.following.pending, timeout=5000)
+        self.until(lambda: not self.window.following.pending)
         assert self.window.actions_[action].isEnabled(), action
         self.window.actions_[action].trigger()
 

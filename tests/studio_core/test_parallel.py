@@ -53,7 +53,7 @@ def test_every_item_is_done_once_in_fixed_chunks(count: int, chunk: int, threads
 
 
 def test_helpers_take_part() -> None:
-    meeting = threading.Barrier(2, timeout=30)
+    meeting = threading.Barrier(2, timeout=60)
     names = []
 
     def body(start: int, stop: int) -> None:
@@ -162,7 +162,7 @@ def test_forgotten_workers_end_their_threads() -> None:
     gc.collect()
     assert gone() is None
     for helper in helpers:
-        helper.join(timeout=30)
+        helper.join(timeout=60)
         assert not helper.is_alive()
 
 

@@ -28,7 +28,7 @@ def drag(
     at = driver.at(start)
     driver.press(at)
     for share in (0.3, 0.7, 1.0):
-        driver.bot.mouseMove(driver.viewport, at + by * share)
+        driver.move(at + by * share)
     driver.release(at + by, keys)
 
 

@@ -12,7 +12,7 @@ import pytest
 from capture_support import CIRCLE, FOUND, FakeCapturer, FakeRun, bracket, kept, plugin
 from names import nameless
 from PySide6.QtCore import QPoint, Qt
-from ui_support import Driver, Make, room
+from ui_support import Driver, Make, move_mouse, room
 
 from studio_core.capturing.edits import add_capture
 from studio_core.capturing.settings import RING, CaptureSettings, Shot
@@ -146,7 +146,7 @@ def test_a_circle_is_dragged_nudged_and_found_again(wizard: Wizard, run: FakeRun
     away = view.to_widget(CIRCLE.x + 10, CIRCLE.y + 5).toPoint()
     bot.mousePress(view, Qt.MouseButton.LeftButton, pos=middle)
     for share in (0.3, 0.6, 1.0):
-        bot.mouseMove(view, middle + (away - middle) * share)
+        move_mouse(view, middle + (away - middle) * share)
     assert len(run.asked) == 1  # nothing is computed while it is dragged
     bot.mouseRelease(view, Qt.MouseButton.LeftButton, pos=away)
     assert document.position == steps + 1
@@ -159,7 +159,7 @@ def test_a_circle_is_dragged_nudged_and_found_again(wizard: Wizard, run: FakeRun
 
     rim = view.to_widget(moved.x + moved.radius, moved.y).toPoint()
     bot.mousePress(view, Qt.MouseButton.LeftButton, pos=rim)
-    bot.mouseMove(view, rim + QPoint(30, 0))
+    move_mouse(view, rim + QPoint(30, 0))
     assert wizard.capture.settings.lens.front.radius > moved.radius + 1
     bot.keyClick(view, Qt.Key.Key_Escape)
     bot.mouseRelease(view, Qt.MouseButton.LeftButton, pos=rim)
@@ -213,8 +213,8 @@ def test_rectangles_are_drawn_moved_switched_and_taken_away(wizard: Wizard, run:
 
     def drag(start: QPoint, end: QPoint) -> None:
         bot.mousePress(view, Qt.MouseButton.LeftButton, pos=start)
-        bot.mouseMove(view, (start + end) / 2)
-        bot.mouseMove(view, end)
+        move_mouse(view, (start + end) / 2)
+        move_mouse(view, end)
         bot.mouseRelease(view, Qt.MouseButton.LeftButton, pos=end)
 
     steps = wizard.driver.document.position
@@ -249,7 +249,7 @@ def test_the_joined_picture_is_turned_by_hand(wizard: Wizard, run: FakeRun) -> N
     view, bot = wizard.work.preview.view, wizard.driver.bot
     start, end = view.to_widget(40, 32).toPoint(), view.to_widget(56, 32).toPoint()
     bot.mousePress(view, Qt.MouseButton.LeftButton, pos=start)
-    bot.mouseMove(view, end)
+    move_mouse(view, end)
     wizard.work.refresh()
     assert view.turning is not None
     assert not view.grab().isNull()

@@ -52,7 +52,7 @@ class Chooser:
         self.answer(f"print({json.dumps(vars(report))!r})")
 
     def settle(self) -> None:
-        self.bot.waitUntil(lambda: self.choice._process is None, timeout=20_000)
+        self.bot.waitUntil(lambda: self.choice._process is None, timeout=60_000)
 
 
 @pytest.fixture
@@ -175,7 +175,7 @@ def test_another_canvas_is_told_everything(driver: Driver, qtbot: QtBot) -> None
     driver.window.viewport.pointer.connect(heard.append)
     old = driver.viewport
     driver.window.viewport.use(RasterViewport())
-    qtbot.waitUntil(lambda: driver.viewport.size() == old.size())
+    qtbot.waitUntil(lambda: driver.viewport.size() == old.size(), timeout=30_000)
     assert driver.viewport is not old
     assert driver.viewport.grab_image() == before
     driver.click((0.0, 3.0, 0.0))

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 from PySide6.QtCore import QPoint, Qt
-from ui_support import Driver, Make, room
+from ui_support import Driver, Make, move_mouse, room
 
 from studio_core.document import Step
 from studio_core.edits import Add
@@ -75,19 +75,22 @@ def test_the_dial_is_dragged_in_one_step_and_follows_the_picture(driver: Driver)
     driver.until(lambda: panel.lights == ("sky",))
     assert panel.form is not None
     dial: Any = panel.form.fields["azimuth"].dial
-    dial.resize(60, 60)
-    driver.bot.mousePress(dial, Qt.MouseButton.LeftButton, pos=QPoint(30, 55))
-    driver.bot.mouseMove(dial, QPoint(50, 50))
-    driver.bot.mouseMove(dial, QPoint(55, 30))
-    assert driver.document.scene["sky"].azimuth == pytest.approx(90.0, abs=0.5)
+
+    def spot(x: float, y: float) -> QPoint:  # the form may still be laid out
+        return QPoint(round(x * dial.width()), round(y * dial.height()))
+
+    driver.bot.mousePress(dial, Qt.MouseButton.LeftButton, pos=spot(0.5, 0.9))
+    move_mouse(dial, spot(0.8, 0.8))
+    move_mouse(dial, spot(0.9, 0.5))
+    assert driver.document.scene["sky"].azimuth == pytest.approx(90.0, abs=1.5)
     assert driver.document.in_gesture
-    driver.bot.mouseRelease(dial, Qt.MouseButton.LeftButton, pos=QPoint(55, 30))
+    driver.bot.mouseRelease(dial, Qt.MouseButton.LeftButton, pos=spot(0.9, 0.5))
     assert driver.labels()[2:] == ["Rotation of Sky"]
     middle = QPoint(driver.viewport.width() // 2, driver.viewport.height() // 2)
     keys, button = Qt.KeyboardModifier.ShiftModifier, Qt.MouseButton.RightButton
     driver.press(middle, keys, button)
-    driver.bot.mouseMove(driver.viewport, middle + QPoint(120, 0))
-    driver.bot.mouseMove(driver.viewport, middle + QPoint(180, 0))
+    driver.move(middle + QPoint(120, 0))
+    driver.move(middle + QPoint(180, 0))
     turned = driver.document.scene["sky"].azimuth
     assert turned != pytest.approx(90.0, abs=1)
     driver.until(lambda: dial.degrees == pytest.approx(turned))

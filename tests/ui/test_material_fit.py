@@ -13,7 +13,7 @@ import pytest
 from fit_support import AZIMUTHS, DARKER, FITTER, PLACES, Pattern
 from names import nameless
 from PySide6.QtCore import QPointF, Qt
-from ui_support import Driver, Make, room
+from ui_support import Driver, Make, move_mouse, room
 
 from studio_core.errors import Cancelled, InputError
 from studio_core.fitting import CHECKERBOARD, NONE, FitRequest, Quality
@@ -202,7 +202,7 @@ def test_a_lamp_of_ones_own(window: Driver, report: FitDialog) -> None:
     to = view.to_widget(0.75 * 6, 0.25 * 5).toPoint()
     middle = view.to_widget(3, 2.5).toPoint()
     window.bot.mousePress(view, Qt.MouseButton.LeftButton, Qt.KeyboardModifier.NoModifier, middle)
-    window.bot.mouseMove(view, to)
+    move_mouse(view, to)
     quiet(window, report)
     azimuth, height = pictures.tool.place
     assert azimuth == pytest.approx(40, abs=1.5)

@@ -16,7 +16,7 @@ from PySide6.QtTest import QAbstractItemModelTester
 from PySide6.QtWidgets import QApplication, QLineEdit
 from random_edits import random_edit
 from scenes import little_scene
-from ui_support import Driver, room
+from ui_support import Driver, move_mouse, room
 
 from studio_core.document import Document
 from studio_core.edits import Add, Compound, Move, Remove, SetFields
@@ -131,7 +131,7 @@ def test_dragging_over_eyes_hides_all_of_them_in_one_step(driver: Driver) -> Non
     view = panel.tree.viewport()
     driver.bot.mousePress(view, Qt.MouseButton.LeftButton, pos=eye(driver, "seat"))
     for node in ("back", "stool", "back"):
-        driver.bot.mouseMove(view, eye(driver, node))
+        move_mouse(view, eye(driver, node))
     driver.until(lambda: driver.document.scene["stool"].hidden)
     driver.bot.mouseRelease(view, Qt.MouseButton.LeftButton, pos=eye(driver, "back"))
     scene = driver.document.scene

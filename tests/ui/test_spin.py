@@ -11,6 +11,7 @@ from PySide6.QtCore import QLocale, QPoint, Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QFormLayout, QLineEdit, QToolTip, QWidget
 from pytestqt.qtbot import QtBot
+from ui_support import move_mouse
 
 from studio_core.params import ParamInfo
 from studio_core.units import LENGTH_UNITS
@@ -160,7 +161,7 @@ def test_what_cannot_be_read_is_told_and_put_back(qtbot: QtBot) -> None:
     write(spin, "3 chairs")
     assert spin.value() == 2
     assert spin.text() == "2 m"
-    qtbot.waitUntil(lambda: "chairs" in QToolTip.text())
+    qtbot.waitUntil(lambda: "chairs" in QToolTip.text(), timeout=30_000)
     QToolTip.hideText()
     write(spin, "45°")
     assert spin.value() == 2
@@ -263,20 +264,20 @@ def test_a_drag_on_the_label_is_one_gesture(qtbot: QtBot) -> None:
     field.show_value(1.0)
     left = Qt.MouseButton.LeftButton
     QTest.mousePress(label, left, pos=QPoint(10, 10))
-    QTest.mouseMove(label, QPoint(11, 10))
+    move_mouse(label, QPoint(11, 10))
     QTest.mouseRelease(label, left, pos=QPoint(11, 10))
     assert heard.told == [], "a click is no drag"
     QTest.mousePress(label, left, pos=QPoint(10, 10))
-    QTest.mouseMove(label, QPoint(20, 10))
-    QTest.mouseMove(label, QPoint(30, 10))
+    move_mouse(label, QPoint(20, 10))
+    move_mouse(label, QPoint(30, 10))
     QTest.mouseRelease(label, left, pos=QPoint(30, 10))
     assert heard.told[0] == "begin"
     assert heard.told[-2:] == [("preview", pytest.approx(1.2)), "commit"]
     heard.told.clear()
     QTest.mousePress(label, left, pos=QPoint(10, 10))
-    QTest.mouseMove(label, QPoint(20, 10))
+    move_mouse(label, QPoint(20, 10))
     QTest.keyClick(field.spin, Qt.Key.Key_Escape)
-    QTest.mouseMove(label, QPoint(40, 10))
+    move_mouse(label, QPoint(40, 10))
     QTest.mouseRelease(label, left, pos=QPoint(40, 10))
     assert heard.told[0] == "begin"
     assert heard.told[-1] == "cancel"

@@ -208,7 +208,7 @@ def test_the_bridge_brings_calls_home_in_order(qtbot: QtBot) -> None:
     thread.start()
     thread.join()
     assert came == []
-    qtbot.waitUntil(lambda: len(came) == 50)
+    qtbot.waitUntil(lambda: len(came) == 50, timeout=30_000)
     assert came == [(n, here) for n in range(50)]
     bridge.post(lambda: came.append((99, here)))
     bridge.close()
@@ -221,7 +221,7 @@ def test_the_bridge_waits_and_forgets_when_closed(qtbot: QtBot) -> None:
     bridge, came = Bridge(), []
     bridge.later(30, lambda: came.append("late"))
     bridge.later(0, lambda: came.append("soon"))
-    qtbot.waitUntil(lambda: came == ["soon", "late"])
+    qtbot.waitUntil(lambda: came == ["soon", "late"], timeout=30_000)
     bridge.later(10, lambda: came.append("never"))
     bridge.close()
     bridge.later(0, lambda: came.append("never"))
@@ -235,7 +235,7 @@ def test_the_bridge_tells_errors_and_goes_on(qtbot: QtBot) -> None:
     bridge = Bridge(told.append)
     bridge.post(lambda: 1 / 0)
     bridge.post(lambda: came.append(1))
-    qtbot.waitUntil(lambda: came == [1])
+    qtbot.waitUntil(lambda: came == [1], timeout=30_000)
     assert isinstance(told[0], ZeroDivisionError)
 
 
@@ -276,7 +276,7 @@ def test_a_task_is_cancelled_at_its_checkpoint(qtbot: QtBot) -> None:
     tasks.run("Long", work, lambda _: ended.append("done"), lambda error: ended.append(type(error)))
     assert started.wait(10)
     tasks.cancel()
-    qtbot.waitUntil(lambda: bool(ended))
+    qtbot.waitUntil(lambda: bool(ended), timeout=30_000)
     assert ended == [Cancelled]
     assert not journal.entries
     executor.close()

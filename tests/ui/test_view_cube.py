@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from PySide6.QtCore import QPoint, QPointF, Qt
-from ui_support import Driver
+from ui_support import Driver, move_mouse
 from views import views
 
 from studio_core.edits import Add, SetFields
@@ -81,13 +81,13 @@ def test_a_click_looks_from_there(driver: Driver, cube: ViewCube, way: tuple[int
 def test_the_mouse_lights_what_it_is_over(driver: Driver, cube: ViewCube) -> None:
     driver.window.viewing.home()
     before = cube.grab().toImage()
-    driver.bot.mouseMove(cube, spot(cube, (0, 0, 1)))
+    move_mouse(cube, spot(cube, (0, 0, 1)))
     assert cube.hovered == (0, 0, 1)
     lit = cube.grab().toImage()
     assert lit != before
-    driver.bot.mouseMove(cube, spot(cube, (1, 1, 1)))
+    move_mouse(cube, spot(cube, (1, 1, 1)))
     assert cube.hovered == (1, 1, 1)
-    driver.bot.mouseMove(cube, QPoint(12, 12))
+    move_mouse(cube, QPoint(12, 12))
     assert cube.hovered == "home"
     assert cube.part_at(QPointF(cube.width() - 2.0, 2.0)) is None
 
@@ -96,9 +96,9 @@ def test_a_drag_turns_about_what_is_looked_at(driver: Driver, cube: ViewCube) ->
     view = driver.session.view
     at = spot(cube, (0, 0, 1))
     driver.bot.mousePress(cube, LEFT, pos=at)
-    driver.bot.mouseMove(cube, at + QPoint(20, 5))
+    move_mouse(cube, at + QPoint(20, 5))
     assert driver.feed.moving
-    driver.bot.mouseMove(cube, at + QPoint(40, 5))
+    move_mouse(cube, at + QPoint(40, 5))
     driver.bot.mouseRelease(cube, LEFT, pos=at + QPoint(40, 5))
     assert not driver.feed.moving
     turned = driver.session.view
@@ -163,7 +163,7 @@ def test_light_is_marked_where_it_comes_from(driver: Driver, cube: ViewCube) -> 
 def test_what_turns_under_a_mouse_at_rest_is_lit(driver: Driver, cube: ViewCube) -> None:
     driver.window.viewing.home()
     at = spot(cube, (1, 0, 0))
-    driver.bot.mouseMove(cube, at)
+    move_mouse(cube, at)
     driver.do("view.front")
     assert cube.hovered == cube.part_at(QPointF(at))
     assert cube.hovered != (1, 0, 0)
