@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NoReturn
 
+from studio.values import add_values
 from studio_core import __version__
 from studio_core.errors import InputError, LucarneError
 
@@ -358,13 +359,7 @@ def _room_options(verb: argparse.ArgumentParser) -> None:
 
 def _backend_options(verb: argparse.ArgumentParser) -> None:
     verb.add_argument("--backend", default="cuts", metavar="ID", help="how light is summed (default: cuts)")
-    verb.add_argument(
-        "--param",
-        action="append",
-        default=[],
-        metavar="KEY=VALUE",
-        help="a parameter of the backend, such as directions=4096 or vertices=100000; may be repeated",
-    )
+    add_values(verb, "--param", "the backend, such as directions=4096 or vertices=100000")
 
 
 def _picture_options(verb: argparse.ArgumentParser) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING
 
+from studio.values import add_values, key_values
 from studio_core.errors import InputError
 from studio_core.session import ALL, INDIRECT, LIGHTS, SHARE
 
@@ -22,13 +23,7 @@ def add_options(verb: argparse.ArgumentParser) -> None:
     text = "how light goes on between surfaces: gather, fields, paths, or none (default: %(default)s)"
     verb.add_argument("--indirect", default=USUAL, metavar="ID", help=text)
     verb.add_argument("--bounces", type=int, metavar="N", help="from how many surfaces light comes at most")
-    verb.add_argument(
-        "--indirect-param",
-        action="append",
-        default=[],
-        metavar="KEY=VALUE",
-        help="a parameter of that method; may be repeated",
-    )
+    add_values(verb, "--indirect-param", "that method")
 
 
 def add_light_option(verb: argparse.ArgumentParser) -> None:
@@ -58,12 +53,7 @@ def chosen_indirect(options: argparse.Namespace, program: Headless) -> IndirectC
     known = program.registry.names(KIND)
     if method not in known:
         raise InputError(f"--indirect {method!r}: known are {', '.join((*known, NONE))}")
-    values: dict[str, object] = {}
-    for text in options.indirect_param:
-        name, equals, value = text.partition("=")
-        if not equals:
-            raise InputError(f"--indirect-param {text!r}: write KEY=VALUE")
-        values[name] = value
+    values = key_values("--indirect-param", options.indirect_param)
     if options.bounces is not None:
         if BOUNCES not in param_infos(program.registry.get(KIND, method).Params):
             raise InputError(f"--bounces: {method} has no such parameter")

@@ -16,6 +16,7 @@ import numpy as np
 
 from studio.headless import Headless
 from studio.indirect_options import chosen_indirect
+from studio.values import key_values
 from studio_core.contract import ShadingBackend
 from studio_core.errors import InputError, ProjectError
 from studio_core.scene.nodes import Light, Scene
@@ -109,12 +110,7 @@ def chosen_backend(
     from studio_core.shading.offline import backend_params
 
     backend: ShadingBackend = program.registry.get("backend", options.backend)
-    values: dict[str, object] = dict(extra)
-    for text in options.param:
-        name, equals, value = text.partition("=")
-        if not equals:
-            raise InputError(f"--param {text!r}: write KEY=VALUE")
-        values[name] = value
+    values = {**extra, **key_values("--param", options.param)}
     try:
         return backend, backend_params(backend, values)
     except InputError as error:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from studio.headless import Headless
 from studio.indirect_options import chosen_indirect
+from studio.values import add_values, key_values
 from studio.verbs import check_target, chosen_backend, replacing_if_there, result
 from studio_core.errors import InputError
 
@@ -29,13 +30,7 @@ def add_options(verb: argparse.ArgumentParser) -> None:
     verb.add_argument("-o", "--out", type=Path, required=True, metavar="OUT.lucarne", help=text)
     text = "how materials are found: joint, mixed, l0 or l2 (default: %(default)s)"
     verb.add_argument("--solver", default=USUAL, metavar="ID", help=text)
-    verb.add_argument(
-        "--solver-param",
-        action="append",
-        default=[],
-        metavar="KEY=VALUE",
-        help="a parameter of the solver; may be repeated",
-    )
+    add_values(verb, "--solver-param", "the solver")
     text = "paint each stroke on the picture that those before have made, instead of all on one"
     verb.add_argument("--one-by-one", action="store_true", help=text)
     verb.add_argument("--report", type=Path, metavar="JSON", help="what was found, and why")
@@ -165,12 +160,7 @@ def _chosen_solver(options: argparse.Namespace, program: Headless) -> tuple[Stro
     if options.solver not in names:
         raise InputError(f"--solver {options.solver!r}: known are {', '.join(names) or 'none'}")
     solver: StrokeSolver = program.registry.get(KIND, options.solver)
-    values: dict[str, object] = {}
-    for text in options.solver_param:
-        name, equals, value = text.partition("=")
-        if not equals:
-            raise InputError(f"--solver-param {text!r}: write KEY=VALUE")
-        values[name] = value
+    values = key_values("--solver-param", options.solver_param)
     try:
         return solver, backend_params(solver, values)
     except InputError as error:
