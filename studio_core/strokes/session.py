@@ -16,12 +16,13 @@ from studio_core.raster import PictureStage
 from studio_core.scene.diff import Aspect, Changes, diff, view_changed
 from studio_core.scene.nodes import MeshObject, Scene, new_id
 from studio_core.session import View
-from studio_core.shading.artifacts import Casters, Hits, Indirect, Lighting, Picture, Shapes, Surfaces
+from studio_core.shading.artifacts import Picture
 from studio_core.shading.frame import Frame, IndirectChoice
 from studio_core.shading.indirect import UnrefinedShapes, with_indirect
 from studio_core.shading.job import Job
 from studio_core.shading.pipeline import Pipeline
 from studio_core.strokes.edits import applied
+from studio_core.strokes.lit import lit_of
 from studio_core.strokes.painting import Marked, marks_of, stroke_name, stroke_of
 from studio_core.strokes.planned import Look, MarkedStroke, PaintedStroke, Planned
 from studio_core.strokes.solution import Finding, Lit
@@ -52,13 +53,10 @@ class Easel:
 
     def lit(self) -> Lit:
         """Of the last picture; InputError where its backend has nothing that solvers can use."""
-        given: list[Any] = [self._pipeline.artifact(kind) for kind in (Surfaces, Casters, Shapes, Lighting)]
-        if any(one is None for one in given):
+        lit = lit_of(self._pipeline, self._frame.scene, self._shapes)
+        if lit is None:
             raise InputError("this backend keeps nothing that strokes could be explained with; try cuts")
-        surfaces, casters, shapes, lighting = given
-        unrefined = self._shapes(self._frame.scene, surfaces, shapes)
-        hits, between = self._pipeline.artifact(Hits), self._pipeline.artifact(Indirect)
-        return Lit(surfaces, casters, unrefined, lighting, hits, between)
+        return lit
 
 
 @dataclass(frozen=True, eq=False)
