@@ -7,7 +7,7 @@ An icon is a few lines of text: `line x,y x,y …`, `ellipse x,y w,h`, `box x,y 
 from __future__ import annotations
 
 from PySide6.QtCore import QPointF, QRectF, Qt
-from PySide6.QtGui import QColor, QIcon, QPainter, QPainterPath, QPen, QPixmap, QPolygonF
+from PySide6.QtGui import QColor, QIcon, QPainter, QPainterPath, QPen, QPixmap, QPixmapCache, QPolygonF
 
 _SIZE = 24
 _OBJECT = """line 12,3.5 19.5,7.5 19.5,16.5 12,20.5 4.5,16.5 4.5,7.5 12,3.5
@@ -162,6 +162,16 @@ def icon(name: str, colour: str, on: str = "", selected: str = "") -> QIcon:
 
 
 def _pixmap(name: str, colour: QColor, ratio: int) -> QPixmap:
+    key = f"{name} {colour.rgba():08x} {ratio}"
+    pixmap = QPixmap()
+    if not QPixmapCache.find(key, pixmap):
+        pixmap = _drawn(name, colour, ratio)
+        QPixmapCache.insert(key, pixmap)
+    return pixmap
+
+
+def _drawn(name: str, colour: QColor, ratio: int) -> QPixmap:
+    strokes = ICONS[name].splitlines()  # before a painter is open: an error would end the process
     pixmap = QPixmap(_SIZE * ratio, _SIZE * ratio)
     pixmap.fill(Qt.GlobalColor.transparent)
     painter = QPainter(pixmap)
@@ -171,7 +181,7 @@ def _pixmap(name: str, colour: QColor, ratio: int) -> QPixmap:
     pen.setCapStyle(Qt.PenCapStyle.RoundCap)
     pen.setJoinStyle(Qt.PenJoinStyle.RoundJoin)
     painter.setPen(pen)
-    for stroke in ICONS[name].splitlines():
+    for stroke in strokes:
         _stroke(painter, stroke)
     painter.end()
     pixmap.setDevicePixelRatio(ratio)
