@@ -14,7 +14,7 @@ run: set-up-run ## Open the sample room (without a display: render it to a pictu
 	@$(BIN)/lucarne demo $(ARGS)
 
 test: lint ## All checks and all tests (ARGS="-k undo" for some)
-	@QT_QPA_PLATFORM=$${QT_QPA_PLATFORM:-offscreen} $(BIN)/python -m pytest -n auto --maxprocesses 4 --dist worksteal $(ARGS)
+	@QT_QPA_PLATFORM=$${QT_QPA_PLATFORM:-offscreen} $(BIN)/python -m pytest -n auto --maxprocesses 4 --dist worksteal --durations 25 --durations-min 4 $(ARGS)
 
 lint: set-up-test ## Style, types, and who may import whom
 	@$(BIN)/ruff check .
