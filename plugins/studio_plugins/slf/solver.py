@@ -77,19 +77,9 @@ class JointRun:
     def solve(self, scene: Scene, strokes: Sequence[NodeId], lit: Lit, params: Params, job: Job) -> Solution:
         """See `studio_core.contract.StrokeRun`."""
         asked = [node for node in map(scene.nodes.get, strokes) if isinstance(node, Stroke)]
+        found, unpaintable = self.decided(scene, asked, lit, params, job)
         notes = [f"{stroke.name} lies on no surface" for stroke in asked if not regions_of(stroke)]
-        found: dict[Region, Painting] = {}
-        for region, todo in steps(scene, touched(scene, asked)).items():
-            name = region.material(scene)
-            if name is None or region.node not in lit.surfaces.nodes:
-                continue  # gone, or hidden: it keeps what it has
-            painting = Painting.begin(scene.material(name), self._services)
-            if painting is None:
-                notes.append(f"nothing of {scene.material(name).name} can be painted")
-                continue
-            for group in todo:
-                self._explain(painting, region, group, scene, lit, params, job)
-            found[region] = painting
+        notes += unpaintable
         canvas = Canvas(scene, lit.surfaces, self._spread, self._services, found)
         edit = canvas.edit(label_of(scene, asked, found))
         names = {stroke.id for stroke in asked}
@@ -109,6 +99,25 @@ class JointRun:
             and (stroke in asked or not remade.isdisjoint(stroke.reached))
         ]
         return self._with_far(solution, scene, far, remade, lit, job) if far else solution
+
+    def decided(
+        self, scene: Scene, asked: Sequence[Stroke], lit: Lit, params: Params, job: Job
+    ) -> tuple[dict[Region, Painting], list[str]]:
+        """What is decided about all that the strokes lie on, not painted yet; and what cannot be painted."""
+        found: dict[Region, Painting] = {}
+        notes: list[str] = []
+        for region, todo in steps(scene, touched(scene, asked)).items():
+            name = region.material(scene)
+            if name is None or region.node not in lit.surfaces.nodes:
+                continue  # gone, or hidden: it keeps what it has
+            painting = Painting.begin(scene.material(name), self._services)
+            if painting is None:
+                notes.append(f"nothing of {scene.material(name).name} can be painted")
+                continue
+            for group in todo:
+                self._explain(painting, region, group, scene, lit, params, job)
+            found[region] = painting
+        return found, notes
 
     def _with_far(
         self,
