@@ -16,13 +16,14 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from studio_core.jit import kernel
 from studio_plugins.slf.samples import F64, Model, Reflectance, Samples
 
 TINY = 1e-300
 FLAT = 1e-9
 """Curvature relative to the largest level's, below which a matte part shows nothing and stays."""
 AMOUNTS = np.concatenate([[0.0], np.geomspace(1e-3, 1.0, 31)])
-ZOOMS, AROUND = 4, 7
+ZOOMS, AROUND = 3, 31
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,12 +41,68 @@ class Grams:
         terms = (samples.at(levels) if terms is None else terms).transpose(0, 3, 1, 2)  # M, 3, N, T
         weighted = terms * importance.T[None, :, :, None]
         aa = weighted.swapaxes(2, 3) @ terms
-        ab = np.einsum("mcnt,nc->mct", weighted, samples.wanted)
+        ab = np.matmul(samples.wanted.T[:, None], weighted)[:, :, 0]  # M, 3, T
         return cls(levels, aa, ab, (importance * samples.wanted**2).sum(axis=0))
 
     def some(self, which: npt.NDArray[np.generic]) -> Grams:
         """These levels."""
         return dataclasses.replace(self, levels=self.levels[which], aa=self.aa[which], ab=self.ab[which])
+
+
+@dataclass(frozen=True, eq=False)
+class Rungs:
+    """Grams of all L levels, and across (L, 3, T, T) of each with the next, their transposes added.
+
+    Terms between two levels are their mixture, so Grams there follow from these without any sample.
+    """
+
+    grams: Grams
+    across: F64
+
+    @classmethod
+    def of(cls, samples: Samples, importance: F64) -> Rungs:
+        """Of all samples."""
+        levels, terms = samples.levels, samples.terms.shape[2]
+        aa, across = np.zeros((2, levels, 3, terms, terms))
+        ab = np.zeros((levels, 3, terms))
+        add_rungs(np.ascontiguousarray(samples.terms), samples.wanted, importance, aa, across, ab)
+        yy = (importance * samples.wanted**2).sum(axis=0)
+        return cls(Grams(np.arange(float(levels)), aa, ab, yy), across)
+
+    def at(self, levels: F64) -> Grams:
+        """At real levels (M,)."""
+        own = self.grams
+        low = np.clip(np.floor(levels), 0, len(own.levels) - 1).astype(np.int64)
+        high = np.minimum(low + 1, len(own.levels) - 1)
+        share = np.clip(levels - low, 0, 1)[:, None, None]
+        ab = (1 - share) * own.ab[low] + share * own.ab[high]
+        share = share[..., None]
+        aa = (1 - share) ** 2 * own.aa[low] + share**2 * own.aa[high]
+        return Grams(levels, aa + share * (1 - share) * self.across[low], ab, own.yy)
+
+
+@kernel
+def add_rungs(terms: F64, wanted: F64, importance: F64, aa: F64, across: F64, ab: F64) -> None:
+    """See `Rungs`: aa, across (L, 3, T, T) and ab (L, 3, T) += those of terms (L, N, T, 3)."""
+    levels, count, width = terms.shape[0], terms.shape[1], terms.shape[2]
+    for level in range(levels):
+        following = min(level + 1, levels - 1)
+        for n in range(count):
+            for t in range(width):
+                for c in range(3):
+                    weighted = importance[n, c] * terms[level, n, t, c]
+                    ab[level, c, t] += weighted * wanted[n, c]
+                    for u in range(t + 1):
+                        aa[level, c, t, u] += weighted * terms[level, n, u, c]
+                    for u in range(width):
+                        across[level, c, t, u] += weighted * terms[following, n, u, c]
+        for c in range(3):
+            for t in range(width):
+                for u in range(t):
+                    aa[level, c, u, t] = aa[level, c, t, u]
+                for u in range(t + 1):
+                    both = across[level, c, t, u] + across[level, c, u, t]
+                    across[level, c, t, u], across[level, c, u, t] = both, both
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,52 +113,107 @@ class Found:
     left: float
 
 
-def best(grams: Grams, model: Model, now: Reflectance, diffuse: bool, tint: F64 | None) -> Found:
-    """The best at one of the levels; the matte part stays unless `diffuse`, and the shine without a `tint`.
+@dataclass(frozen=True, eq=False)
+class Shines:
+    """K shines (K, 3), amounts (K,) of a tint whose largest channel is 1, or the one that stays (no tint).
 
-    A shine is an amount of the tint (3,), whose largest channel is 1.
+    room (K, 3) is the largest matte part beside each; coefficients (K, T, 3) are `plain` without any, and
+    rise with it.
     """
-    if tint is None:
-        shine = now.specular[None]
-        error, matte = _errors(grams, model, now, shine, diffuse)
-        level = int(np.argmin(error[:, 0]))
-        return Found(
-            Reflectance(matte[level, 0], now.specular, float(grams.levels[level])), float(error[level, 0])
-        )
-    amounts = np.unique(np.append(AMOUNTS, now.specular.max()))
-    low, high = 0.0, 1.0
-    for zoom in range(ZOOMS):
-        error, matte = _errors(grams, model, now, amounts[:, None] * tint, diffuse)
-        level, at = (int(i) for i in np.unravel_index(np.argmin(error), error.shape))
-        made = Found(
-            Reflectance(matte[level, at], amounts[at] * tint, float(grams.levels[level])),
-            float(error[level, at]),
-        )
-        if zoom == ZOOMS - 1:
-            break
-        low, high = amounts[max(at - 1, 0)], amounts[min(at + 1, len(amounts) - 1)]
-        amounts = np.unique(np.append(np.linspace(low, high, AROUND), amounts[at]))
-        near = np.arange(max(level - 1, 0), min(level + 2, len(grams.levels)))
-        grams = grams.some(near)
-    return made
+
+    tint: F64 | None
+    amounts: F64
+    shine: F64
+    room: F64
+    plain: F64
+    rise: F64
+
+    @classmethod
+    def start(cls, model: Model, now: Reflectance, tint: F64 | None) -> Shines:
+        """With which a search begins: today's amount, and, where there is a tint, all of AMOUNTS."""
+        own = now.specular.max()
+        return cls.of(model, now, tint, np.unique(np.append([] if tint is None else AMOUNTS, own)))
+
+    @classmethod
+    def of(cls, model: Model, now: Reflectance, tint: F64 | None, amounts: F64) -> Shines:
+        """Of amounts (K,)."""
+        shine = now.specular[None] if tint is None else amounts[:, None] * tint
+        room = model.room(shine)
+        matte = np.concatenate([np.zeros_like(room), room])
+        plain, full = np.split(model.coefficients(matte, np.concatenate([shine, shine])), 2)
+        return cls(tint, amounts, shine, room, plain, (full - plain) / np.maximum(room, 1e-9)[:, None])
+
+    def finer(self, model: Model, now: Reflectance, at: int) -> Shines:
+        """More of them between the neighbours of one."""
+        low, high = self.amounts[max(at - 1, 0)], self.amounts[min(at + 1, len(self.amounts) - 1)]
+        amounts = np.append(np.linspace(low, high, AROUND), self.amounts[at])
+        return Shines.of(model, now, self.tint, np.unique(amounts))
 
 
-def _errors(grams: Grams, model: Model, now: Reflectance, shine: F64, diffuse: bool) -> tuple[F64, F64]:
-    """(M, K) weighted squared errors at all levels for shines (K, 3), and the matte parts (M, K, 3)."""
-    room = model.room(shine)
-    plain = model.coefficients(np.zeros_like(shine), shine).swapaxes(-1, -2)  # K, 3, T
-    rise = model.coefficients(room, shine).swapaxes(-1, -2) - plain
-    rise = rise / np.maximum(room, 1e-9)[..., None]
-    rise_a = np.einsum("kct,mctu->mkcu", rise, grams.aa, optimize=True)
-    curve = np.einsum("mkcu,kcu->mkc", rise_a, rise)
-    if diffuse:
-        slope = np.einsum("mct,kct->mkc", grams.ab, rise) - np.einsum("mkcu,kcu->mkc", rise_a, plain)
-        seen = curve > FLAT * max(float(curve.max(initial=0)), TINY)
-        matte = np.where(seen, slope / np.where(seen, curve, 1), now.diffuse)
-        matte = np.clip(matte, 0, room)
-    else:
-        matte = np.broadcast_to(np.minimum(now.diffuse, room), curve.shape)
-    made = plain + matte[..., None] * rise  # M, K, 3, T
-    square = np.einsum("mkct,mctu,mkcu->mk", made, grams.aa, made, optimize=True)
-    error = square - 2 * np.einsum("mkct,mct->mk", made, grams.ab) + grams.yy.sum()
-    return np.asarray(np.maximum(error, 0)), matte
+def best(grams: Grams, model: Model, now: Reflectance, diffuse: bool, shines: Shines) -> Found:
+    """The best at one of the levels, searched from some shines on; the matte part stays unless `diffuse`."""
+    level = at = 0
+    for zoom in range(1 if shines.tint is None else ZOOMS):
+        if zoom:
+            near = np.arange(max(level - 1, 0), min(level + 2, len(grams.levels)))
+            grams, shines = grams.some(near), shines.finer(model, now, at)
+        errors, matte = errors_of(grams, now, diffuse, shines)
+        level, at = divmod(int(np.argmin(errors)), len(shines.amounts))
+    made = Reflectance(matte[level, at], shines.shine[at], float(grams.levels[level]))
+    return Found(made, float(errors[level, at]))
+
+
+def errors_of(grams: Grams, now: Reflectance, diffuse: bool, shines: Shines) -> tuple[F64, F64]:
+    """(M, K) weighted squared errors at all levels for all shines, and the matte parts (M, K, 3)."""
+    errors = np.full((len(grams.levels), len(shines.amounts)), grams.yy.sum())
+    matte = np.empty((*errors.shape, 3))
+    own = now.diffuse
+    add_errors(grams.aa, grams.ab, shines.plain, shines.rise, shines.room, own, diffuse, errors, matte)
+    return np.maximum(errors, 0), matte
+
+
+@kernel
+def add_errors(
+    aa: F64,
+    ab: F64,
+    plain: F64,
+    rise: F64,
+    room: F64,
+    own: F64,
+    diffuse: bool,
+    errors: F64,
+    matte: F64,
+) -> None:
+    """errors (M, K) += cᵀAc − 2 c·b of c = plain + matte · rise (K, T, 3), matte (M, K, 3) being the best.
+
+    Or own (3,) as far as there is room (K, 3), unless `diffuse` and where it shows nothing.
+    """
+    levels, shines, terms = len(aa), len(plain), plain.shape[1]
+    curve, slope = np.empty((levels, shines, 3)), np.empty((levels, shines, 3))
+    most = 0.0
+    for m in range(levels):
+        for k in range(shines):
+            for c in range(3):
+                bend, tilt, still, towards = 0.0, 0.0, 0.0, 0.0
+                for t in range(terms):
+                    risen, put = 0.0, 0.0
+                    for u in range(terms):
+                        risen += aa[m, c, t, u] * rise[k, u, c]
+                        put += aa[m, c, t, u] * plain[k, u, c]
+                    bend += rise[k, t, c] * risen
+                    tilt += rise[k, t, c] * (ab[m, c, t] - put)
+                    still += plain[k, t, c] * put
+                    towards += plain[k, t, c] * ab[m, c, t]
+                curve[m, k, c], slope[m, k, c] = bend, tilt
+                errors[m, k] += still - 2 * towards
+                most = max(most, bend)
+    least = FLAT * max(most, TINY)
+    for m in range(levels):
+        for k in range(shines):
+            for c in range(3):
+                made = own[c]
+                if diffuse and curve[m, k, c] > least:
+                    made = slope[m, k, c] / curve[m, k, c]
+                made = min(max(made, 0.0), room[k, c])
+                matte[m, k, c] = made
+                errors[m, k] += made * (made * curve[m, k, c] - 2 * slope[m, k, c])

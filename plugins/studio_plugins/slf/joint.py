@@ -20,7 +20,7 @@ from enum import Flag, auto
 
 import numpy as np
 
-from studio_plugins.slf.grams import Found, Grams
+from studio_plugins.slf.grams import Found, Grams, Rungs, Shines
 from studio_plugins.slf.grams import best as best_of
 from studio_plugins.slf.samples import F64, Model, Reflectance, Samples
 
@@ -110,21 +110,19 @@ def decide(
         return Verdict((nothing,), Change.DIFFUSE | Change.SPECULAR | Change.GLOSS)
     importance = samples.importance
     before = float((importance * (samples.before - samples.wanted) ** 2).sum() / total)
-    every = Grams.of(samples, half_levels(samples.levels), importance)
+    rungs = Rungs.of(samples, importance)
+    every = rungs.at(half_levels(samples.levels))
     here = Grams.of(samples, np.array([now.level]), importance, samples.own[None])
     others = every.some(np.flatnonzero(np.abs(every.levels - now.level) > APART))
+    offered = [(now.tint, 0)]
+    offered += [(t / max(t.max(), 1e-9), 2) for t in tints if _apart(t, now.tint)]
+    changing = [(Shines.start(model, now, tint), extra) for tint, extra in offered]
+    staying = [(Shines.start(model, now, None), 0)]
     made = []
     for change in allowed:
         grams, diffuse = others if Change.GLOSS in change else here, Change.DIFFUSE in change
-        found = [(_finer(samples, importance, grams, model, now, diffuse, None), 0)]
-        if Change.SPECULAR in change:
-            offered = [(now.tint, 0)]
-            offered += [(t / max(t.max(), 1e-9), 2) for t in tints if _apart(t, now.tint)]
-            found = [
-                (_finer(samples, importance, grams, model, now, diffuse, tint), extra)
-                for tint, extra in offered
-            ]
-        for one, extra in found:
+        for shines, extra in changing if Change.SPECULAR in change else staying:
+            one = _finer(rungs, grams, model, now, diffuse, shines)
             left = one.left / total
             score = PLACES * math.log(left + NOISE**2) + (change.cost + extra) * math.log(PLACES)
             explained = 1 - left / before if before > 0 else 0.0
@@ -138,20 +136,14 @@ def decide(
 
 
 def _finer(
-    samples: Samples,
-    importance: F64,
-    grams: Grams,
-    model: Model,
-    now: Reflectance,
-    diffuse: bool,
-    tint: F64 | None,
+    rungs: Rungs, grams: Grams, model: Model, now: Reflectance, diffuse: bool, shines: Shines
 ) -> Found:
     """The best at the levels, and then between them where there are several."""
-    found = best_of(grams, model, now, diffuse, tint)
+    found = best_of(grams, model, now, diffuse, shines)
     if len(grams.levels) > 1:
         about = found.reflectance.level + np.array([-0.25, -0.125, 0.125, 0.25])
-        about = np.clip(about, 0, samples.levels - 1)
-        again = best_of(Grams.of(samples, about, importance), model, now, diffuse, tint)
+        about = np.clip(about, 0, len(rungs.across) - 1)
+        again = best_of(rungs.at(about), model, now, diffuse, shines)
         if again.left < found.left:
             return again
     return found

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from plugins.slf.strokes import LEVELS, MODEL, painted, reflectance
 from scipy.optimize import minimize
 
-from studio_plugins.slf.grams import Grams, best
+from studio_plugins.slf.grams import Grams, Rungs, Shines, best, errors_of
 
 NOW = reflectance((0.5, 0.3, 0.2), (0.1, 0.1, 0.1), 8)
 
@@ -22,7 +22,7 @@ def cost(samples, diffuse, specular, level):
 
 def found_in(samples, levels, diffuse, tint):
     grams = Grams.of(samples, np.asarray(levels, float), samples.importance)
-    found = best(grams, MODEL, NOW, diffuse, tint)
+    found = best(grams, MODEL, NOW, diffuse, Shines.start(MODEL, NOW, tint))
     made = found.reflectance
     assert (made.diffuse >= 0).all()
     assert (made.specular >= 0).all()
@@ -72,3 +72,36 @@ def test_what_shows_nothing_stays():
     dark = dataclasses.replace(samples, terms=samples.terms * [[0.0], [1.0]])
     found = found_in(dark, [8.0], True, None)
     np.testing.assert_array_equal(found.reflectance.diffuse, NOW.diffuse)
+
+
+@settings(max_examples=20, deadline=None)
+@given(st.integers(0, 10_000), st.lists(st.floats(0, LEVELS - 1), min_size=1, max_size=5))
+def test_grams_between_levels_are_those_of_terms_between_levels(seed, levels):
+    rng = np.random.default_rng(seed)
+    samples = painted(rng, NOW, reflectance(rng.uniform(0, 0.8, 3), NOW.specular, 8))
+    importance = samples.importance * rng.uniform(0, 1, (len(samples), 1))
+    made = Rungs.of(samples, importance).at(np.array(levels))
+    exact = Grams.of(samples, np.array(levels), importance)
+    for name in ("aa", "ab", "yy"):
+        wanted = getattr(exact, name)
+        np.testing.assert_allclose(getattr(made, name), wanted, rtol=1e-11, atol=1e-11 * np.abs(wanted).max())
+
+
+@settings(max_examples=20, deadline=None)
+@given(st.integers(0, 10_000), st.booleans())
+def test_errors_of_all_shines_at_once(seed, diffuse):
+    """Against residuals place by place."""
+    rng = np.random.default_rng(seed)
+    samples = painted(rng, NOW, reflectance(rng.uniform(0, 0.8, 3), NOW.specular, 8), 0.1)
+    levels, shines = np.array([3.0, 8.5]), Shines.start(MODEL, NOW, np.array([1.0, 0.5, 0.25]))
+    grams = Grams.of(samples, levels, samples.importance)
+    errors, matte = errors_of(grams, NOW, diffuse, shines)
+    for m, k in ((0, 0), (0, 9), (1, 30)):
+        exact = cost(samples, matte[m, k], shines.shine[k], levels[m])
+        assert abs(errors[m, k] - exact) <= 1e-9 * grams.yy.sum()
+        if diffuse:
+            for off in (-0.01, 0.01):
+                moved = np.clip(matte[m, k] + off, 0, shines.room[k])
+                assert cost(samples, moved, shines.shine[k], levels[m]) >= exact - 1e-9 * grams.yy.sum()
+        else:
+            np.testing.assert_array_equal(matte[m, k], np.minimum(NOW.diffuse, shines.room[k]))
