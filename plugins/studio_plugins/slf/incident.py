@@ -18,6 +18,7 @@ from studio_core.jit import kernel
 from studio_core.kernels.directions import leaf_of
 from studio_core.parallel import Checkpoints
 from studio_core.scene.nodes import Light, Scene
+from studio_core.scene.world_mesh import WorldMesh
 from studio_core.shading.artifacts import Lighting
 from studio_core.strokes.solution import Lit
 from studio_core.transport.bounces import sent_towards
@@ -35,8 +36,10 @@ I64 = npt.NDArray[np.int64]
 Bools = npt.NDArray[np.bool_]
 SIDE = 32
 LAMP_SAMPLES = 64
-MEAN_K = 13
-"""Leaves of the environment that a cell's mean is made from: about four to a cell."""
+MOST = 1024
+"""Vertices whose light is kept while they are not asked for: 12 MB."""
+OF_QUARTERS, OF_SIXTEENTHS = 13, 15
+"""2^k means of the environment are as large as parts of cells are, of which there are 2^11 around."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,7 +48,8 @@ class Arriving:
 
     row (N,) of what follows; light (R, 1024, 3) radiance from the pattern's cells, open (R, 1024) whether
     that is the sky, axes (R, 3, 3) rows t, b, n of the vertices; towards (N, C, 3) world, and strength
-    (N, C, 3): irradiance of lamps and suns on what faces them. sky (2^k, 3) is radiance by leaf.
+    (N, C, 3): irradiance of lamps and suns on what faces them. sky (2^k, 3) is radiance by leaf, the mean
+    over a sixteenth of a cell.
     """
 
     row: I64
@@ -58,19 +62,68 @@ class Arriving:
     rays: int
 
 
+@dataclass(frozen=True, eq=False)
+class _Rows:
+    """Of R vertices, in rising order, light and openness (R, 1024), as `Arriving` has them; sky (2^k, 3).
+
+    What it was made from is `key`.
+    """
+
+    key: tuple[object, ...]
+    vertex: I64
+    light: F32
+    open: Bools
+    sky: F32
+
+
 class Incident:
-    """What vertices near strokes see, kept; owned by the compute thread."""
+    """What vertices near strokes see, kept, and its light while that stays; owned by the compute thread."""
 
     def __init__(self, services: Services) -> None:
         self._workers = services.workers
         self.pattern: Pattern = grid_pattern(SIDE)
         self.table = Transport(services.workers, self.pattern)
+        self._rows: _Rows | None = None
 
     def at(self, scene: Scene, lit: Lit, places: Places, job: Checkpoints | None = None) -> Arriving:
         """Light at places, as it is now."""
+        rows, rays = self._seen(scene, lit, np.unique(places.vertex), job)
+        mesh, row = lit.surfaces.unrefined.mesh, np.searchsorted(rows.vertex, places.vertex)
+        towards, strength, more = self._lamps(scene, lit, places, job)
+        axes = _axes(mesh, rows.vertex)
+        return Arriving(row, rows.light, rows.open, axes, towards, strength, rows.sky, rays + more)
+
+    def _seen(self, scene: Scene, lit: Lit, vertices: I64, job: Checkpoints | None) -> tuple[_Rows, int]:
+        """What is seen from vertices, and maybe from others, and how many rays that took."""
+        environment, sent = lit.lighting.environment, lit.indirect.sent if lit.indirect else None
+        node = scene.nodes.get(environment.id) if environment is not None else None
+        shown = node if node is not None and scene.shown(node.id) else None
+        key = (lit.surfaces.unrefined.mesh, lit.casters, lit.lighting, sent, shown)
+        kept = self._rows
+        if kept is not None and not all(one is other for one, other in zip(key, kept.key, strict=True)):
+            kept = None
+        new = vertices if kept is None else np.setdiff1d(vertices, kept.vertex, assume_unique=True)
+        if kept is not None and not len(new):
+            return kept, 0
+        sky = kept.sky if kept is not None else self._sky(scene, lit.lighting)
+        light, open_, rays = self._gathered(lit, new, sky, job)
+        made = _Rows(key, new, light, open_, sky)
+        if kept is not None:
+            some = np.arange(len(kept.vertex))
+            if len(some) + len(new) > MOST:
+                some = np.flatnonzero(np.isin(kept.vertex, vertices))
+            both = np.concatenate([kept.vertex[some], new])
+            order = np.argsort(both)
+            light = np.concatenate([kept.light[some], light])[order]
+            open_ = np.concatenate([kept.open[some], open_])[order]
+            made = _Rows(key, both[order], light, open_, sky)
+        self._rows = made
+        return made, rays
+
+    def _gathered(self, lit: Lit, vertices: I64, sky: F32, job: Checkpoints | None) -> tuple[F32, Bools, int]:
+        """Light (R, 1024, 3) and openness (R, 1024) of vertices."""
         surfaces = lit.surfaces.unrefined
         mesh = surfaces.mesh
-        vertices, row = np.unique(places.vertex, return_inverse=True)
         wanted = np.zeros(len(mesh), np.bool_)
         wanted[vertices] = True
         done = self.table.update(surfaces, lit.casters, wanted, job)
@@ -82,22 +135,16 @@ class Incident:
             sent, surface = lit.indirect.sent.light, lit.indirect.sent.surface
             hit, from_ = met[known].astype(np.int64), cell[known].astype(np.int64)
             light[known] = sent_towards(sent, surface, hit, from_, self._workers, None)
-        normal, tangent = mesh.normals[vertices], mesh.tangents[vertices]
-        across = tangent[:, 3:] * np.cross(normal, tangent[:, :3])
-        axes = np.ascontiguousarray(np.stack([tangent[:, :3], across, normal], axis=1), np.float32)
-        open_, sky = met == NOTHING, self._sky(scene, lit.lighting)
+        open_ = met == NOTHING
         if len(sky):
-            local = self.pattern.directions[0]
-            spread = _offsets(2)
-            means = np.zeros_like(light)
+            local, axes = self.pattern.directions[0], _axes(mesh, vertices)
+            spread, coarse = _offsets(2), averaged(sky, OF_QUARTERS)
 
             def body(start: int, stop: int) -> None:
-                sky_means(axes, local, spread, sky, open_, means, start, stop)
+                sky_means(axes, local, spread, coarse, open_, light, start, stop)
 
             self._workers.run(len(axes), 16, body, None)
-            light = np.where(open_[..., None], means, light)
-        towards, strength, rays = self._lamps(scene, lit, places, job)
-        return Arriving(row, light, open_, axes, towards, strength, sky, done.rays + rays)
+        return light, open_, done.rays
 
     def _sky(self, scene: Scene, lighting: Lighting) -> F32:
         tree, environment = lighting.tree, lighting.environment
@@ -106,7 +153,7 @@ class Incident:
         node = scene.nodes.get(environment.id)
         if not isinstance(node, Light) or not scene.shown(node.id):
             return np.zeros((0, 3), np.float32)
-        return np.asarray(tree.radiance * np.asarray(node.gain(), np.float32), np.float32)
+        return averaged(tree.radiance, OF_SIXTEENTHS) * np.asarray(node.gain(), np.float32)
 
     def _lamps(self, scene: Scene, lit: Lit, places: Places, job: Checkpoints | None) -> tuple[F32, F32, int]:
         lighting, mesh = lit.lighting, lit.surfaces.unrefined.mesh
@@ -138,6 +185,20 @@ class Incident:
             bits.seen, towards, strength,
         )  # fmt: skip
         return towards, strength, rays
+
+
+def _axes(mesh: WorldMesh, vertices: I64) -> F32:
+    """(R, 3, 3) rows t, b, n."""
+    normal, tangent = mesh.normals[vertices], mesh.tangents[vertices]
+    across = tangent[:, 3:] * np.cross(normal, tangent[:, :3])
+    return np.ascontiguousarray(np.stack([tangent[:, :3], across, normal], axis=1), np.float32)
+
+
+def averaged(radiance: F32, k: int) -> F32:
+    """(2^k, 3) means of the leaves of as many cells around; those that are no finer as they are."""
+    if len(radiance) <= 1 << k:
+        return radiance
+    return np.asarray(radiance.reshape(1 << k, -1, 3).mean(axis=1), np.float32)
 
 
 def _offsets(side: int) -> F32:
@@ -210,4 +271,4 @@ def arriving(
                     strength[n, c, channel] = weight * colour[c, channel]
 
 
-__all__ = ["Arriving", "Incident"]
+__all__ = ["OF_QUARTERS", "SIDE", "Arriving", "Incident", "averaged"]

@@ -215,8 +215,8 @@ class JointRun:
         painting.take(Step(tuple(stroke for stroke, _, _ in parts), verdict, now, gloss, count))
 
     def _sums(self, dressed: Dressed, shapes: Any, light: Arriving, places: Places, job: Job) -> F64:
-        brdf, pattern = dressed.resolved.brdf, self._incident.pattern.directions[0]
-        return sums_at(brdf.address, brdf.terms, shapes, light, places, pattern, self._services.workers, job)
+        brdf = dressed.resolved.brdf
+        return sums_at(brdf.address, brdf.terms, shapes, light, places, self._services.workers, job)
 
 
 SOLVER = Joint()

@@ -8,13 +8,13 @@ import pytest
 from studio_core.brdfs.calls import evaluate_at
 from studio_core.kernels.directions import direction_set
 from studio_core.transport.patterns import grid_pattern
-from studio_plugins.slf.columns import WITHIN, sums_at
-from studio_plugins.slf.incident import Arriving, arriving, sky_means
+from studio_plugins.slf.columns import FAR, FINE, MIDDLE, sums_at
+from studio_plugins.slf.incident import Arriving, arriving, averaged, sky_means
 from studio_plugins.slf.ladder import alpha_of_level
 from studio_plugins.slf.places import Places
 
 CELLS = grid_pattern(32).directions[0]
-PARTS = grid_pattern(128).directions[0].reshape(1024, 16, 3)
+SOLID = 2 * np.pi / 1024
 COUNT, ROWS, LAMPS = 5, 3, 4
 
 
@@ -58,41 +58,48 @@ def some_places(rng, light):
 
 def plainly(address, terms, shape, light, places, n, sharp):
     row = light.row[n]
-    world = CELLS @ light.axes[row]
+    local = CELLS @ light.axes[row] @ places.axes[n].T
+    cosine = local @ (places.wo[n] * [-1, -1, 1])
     directions, weights = [], []
-    mirror = places.wo[n] * [-1, -1, 1]
     for cell in range(1024):
-        local = places.axes[n] @ world[cell]
-        if sharp and local @ mirror > np.cos(WITHIN):
-            for part in PARTS[cell] @ light.axes[row]:
+        block = slice(cell // 4 * 4, cell // 4 * 4 + 4)
+        if sharp and cosine[cell] > np.cos(MIDDLE):
+            side = 4 if cosine[cell] > np.cos(FINE) else 2
+            for part in grid_pattern(32 * side).directions[0].reshape(1024, -1, 3)[cell] @ light.axes[row]:
                 seen = light.light[row, cell]
                 if light.open[row, cell] and len(light.sky):
-                    k = len(light.sky).bit_length() - 1
-                    seen = light.sky[direction_set(k).leaf_of(part)[0]]
-                directions.append(places.axes[n] @ part)
-                weights.append(seen * 2 * np.pi / 1024 / 16)
+                    k = min(len(light.sky).bit_length() - 1, 15 if side == 4 else 13)
+                    seen = averaged(light.sky, k)[direction_set(k).leaf_of(part)[0]]
+                towards = places.axes[n] @ part
+                directions.append(towards)
+                weights.append(seen * max(towards[2], 0) * SOLID / side**2)
+        elif cosine[block].max() < np.cos(FAR):
+            if cell % 4 == 0:
+                parts = light.light[row, block] * np.maximum(local[block, 2:], 0) * SOLID
+                middle = parts.sum(axis=1) @ local[block]
+                directions.append(middle / max(np.linalg.norm(middle), 1e-30))
+                weights.append(parts.sum(axis=0))
         else:
-            directions.append(local)
-            weights.append(light.light[row, cell] * 2 * np.pi / 1024)
+            directions.append(local[cell])
+            weights.append(light.light[row, cell] * max(local[cell, 2], 0) * SOLID)
     for c in range(LAMPS):
         directions.append(places.axes[n] @ light.towards[n, c])
-        weights.append(light.strength[n, c])
-    wi, weight = np.array(directions), np.array(weights)
-    made = evaluate_at(address, terms, shape, places.wo[n], wi)
-    return np.einsum("it,ic,i->tc", made, weight, np.maximum(wi[:, 2], 0))
+        weights.append(light.strength[n, c] * max(directions[-1][2], 0))
+    made = evaluate_at(address, terms, shape, places.wo[n], np.array(directions))
+    return np.einsum("it,ic->tc", made, np.array(weights))
 
 
 @pytest.mark.parametrize("open_", [False, True])
 def test_columns_are_sums_over_cells_and_lamps(host, workers, open_):
     rng = np.random.default_rng(2)
-    sky = rng.uniform(0, 3, (1 << 11 if open_ else 0, 3)).astype(np.float32)
+    sky = rng.uniform(0, 3, (1 << 14 if open_ else 0, 3)).astype(np.float32)
     light = some_light(rng, sky)
     places = some_places(rng, light)
     model = host.brdf("specgloss")
     values = {"diffuse": (0.5, 0.5, 0.5), "specular": (0.2, 0.2, 0.2), "keep_energy": True}
     levels = np.arange(20)
     shapes = np.stack([model.shape({**values, "roughness": alpha_of_level(i) ** 0.5}) for i in levels])
-    made = sums_at(model.address, model.terms, shapes, light, places, CELLS, workers)
+    made = sums_at(model.address, model.terms, shapes, light, places, workers)
     for level in (0, 9, 15, 19):
         for n in range(COUNT):
             sharp = alpha_of_level(level) < 0.32
