@@ -198,6 +198,16 @@ def _around(mesh: Fan) -> tuple[F32, F32, F32]:
     return geometric.astype(np.float32), inset.astype(np.float32), (total(size) / 6).astype(np.float32)
 
 
+def _areas(mesh: Fan) -> F32:
+    """(V,) a third of the area of the faces around each vertex."""
+    a, b, c = (mesh.points[mesh.weld[mesh.faces[:, k]]] for k in range(3))
+    size = np.linalg.norm(np.cross(b - a, c - a), axis=1)
+    seen = np.flatnonzero(mesh.back[:, 0] != NONE)
+    vertex = np.concatenate([mesh.faces.reshape(-1), mesh.back[seen].reshape(-1)])
+    face = np.repeat(np.concatenate([np.arange(len(size)), seen]), 3)
+    return np.asarray(np.bincount(vertex, size[face], minlength=len(mesh.weld)) / 6, np.float32)
+
+
 def refine(
     mesh: ShadingMesh, *, faces: npt.ArrayLike | None = None, marked: npt.ArrayLike | None = None
 ) -> ShadingMesh:
@@ -215,6 +225,65 @@ def refined(
     mesh: ShadingMesh, *, faces: npt.ArrayLike | None = None, marked: npt.ArrayLike | None = None
 ) -> tuple[ShadingMesh, Ints]:
     """The same, and of each new face (F,) the face of `mesh` that it is (a part of): 1 to 4, in order."""
+    made, ends, parts = _cut(mesh, faces, marked)
+    same = np.arange(len(mesh.faces))
+    if not len(ends):
+        return mesh, same
+    grown = _finished(made, mesh.edge, mesh.uvs is not None)
+
+    def kept(old: F32, new: F32) -> F32:
+        return np.concatenate([old, new[len(mesh) :]])
+
+    result = dataclasses.replace(
+        grown,
+        positions=kept(mesh.positions, grown.positions),
+        normals=kept(mesh.normals, grown.normals),
+        tangents=kept(mesh.tangents, grown.tangents),
+        geometric=kept(mesh.geometric, grown.geometric),
+        inset=kept(mesh.inset, grown.inset),
+        parents=np.concatenate([mesh.parents, ends.astype(np.uint32)]),
+    )
+    return result, np.repeat(same, parts)
+
+
+def places_between(mesh: ShadingMesh, marked: npt.ArrayLike) -> ShadingMesh:
+    """As `refine`, where only places and looks matter, in a third of the time.
+
+    Tangents, geometric normals and insets of new vertices are 0: no light can be computed on it.
+    """
+    made, ends, _ = _cut(mesh, None, marked)
+    if not len(ends):
+        return mesh
+    new = slice(len(mesh), None)
+
+    def longer(old: F32, more: Floats | None = None) -> F32:
+        zeros = np.zeros((len(ends), *old.shape[1:]), np.float32)
+        return np.concatenate([old, zeros if more is None else more.astype(np.float32)])
+
+    return dataclasses.replace(
+        mesh,
+        positions=longer(mesh.positions, made.points[made.weld[new]]),
+        normals=longer(mesh.normals, made.normals[new]),
+        tangents=longer(mesh.tangents),
+        geometric=longer(mesh.geometric),
+        inset=longer(mesh.inset),
+        area=_areas(made),
+        uvs=None if mesh.uvs is None else longer(mesh.uvs, made.uvs[new]),
+        slot=made.slot.astype(np.uint16),
+        side=made.side.astype(np.int8),
+        welded=made.weld.astype(np.uint32),
+        parents=np.concatenate([mesh.parents, ends.astype(np.uint32)]),
+        faces=made.faces.astype(np.uint32),
+        back_faces=np.where(made.back == NONE, NO_BACK, made.back).astype(np.uint32),
+        source_face=made.source.astype(np.uint32),
+        slots=made.slots.astype(np.uint16),
+    )
+
+
+def _cut(
+    mesh: ShadingMesh, faces: npt.ArrayLike | None, marked: npt.ArrayLike | None
+) -> tuple[Fan, Ints, Ints]:
+    """The mesh with edges cut, the ends (N, 2) that new vertices are between, parts (F,) of each face."""
     back = np.where(mesh.back_faces == NO_BACK, NONE, mesh.back_faces.astype(np.int64))
     weld = mesh.welded.astype(np.int64)
     points = np.zeros((int(weld.max(initial=-1)) + 1, 3))
@@ -232,9 +301,9 @@ def refined(
         slots=mesh.slots.astype(np.int64),
     )
     corners = weld[base.faces]
-    same = np.arange(len(corners))
+    nothing = base, np.zeros((0, 2), np.int64), np.ones(len(corners), np.int64)
     if not len(corners):
-        return mesh, same
+        return nothing
     around = edges(corners)
     rows = np.arange(len(corners))
     top = around.of[rows, longest(points, corners)]
@@ -249,24 +318,10 @@ def refined(
             break
         cut[needed] = True
     if not cut.any():
-        return mesh, same
+        return nothing
     halves = cut[around.of]
     made, ends = split(base, halves, np.full(corners.shape, 0.5))
-    grown = _finished(made, mesh.edge, mesh.uvs is not None)
-
-    def kept(old: F32, new: F32) -> F32:
-        return np.concatenate([old, new[len(mesh) :]])
-
-    result = dataclasses.replace(
-        grown,
-        positions=kept(mesh.positions, grown.positions),
-        normals=kept(mesh.normals, grown.normals),
-        tangents=kept(mesh.tangents, grown.tangents),
-        geometric=kept(mesh.geometric, grown.geometric),
-        inset=kept(mesh.inset, grown.inset),
-        parents=np.concatenate([mesh.parents, ends.astype(np.uint32)]),
-    )
-    return result, np.repeat(same, 1 + halves.sum(axis=1))
+    return made, ends, 1 + halves.sum(axis=1)
 
 
 def _named(ends: Ints, pairs: Ints) -> Ints:

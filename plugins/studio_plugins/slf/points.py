@@ -9,8 +9,9 @@ import numpy as np
 import numpy.typing as npt
 from scipy.spatial import cKDTree
 
+from studio_core.jit import kernel
 from studio_core.scene.between import Cloud, weigh
-from studio_core.scene.shading_mesh import NO_BACK, ShadingMesh, refined
+from studio_core.scene.shading_mesh import NO_BACK, ShadingMesh, places_between
 
 F32 = npt.NDArray[np.float32]
 I64 = npt.NDArray[np.int64]
@@ -48,16 +49,19 @@ class Known:
 
 def finer(
     mesh: ShadingMesh,
-    known: Callable[[ShadingMesh], Known],
+    known: Callable[[ShadingMesh, Known | None], Known],
     seeds: tuple[F32, F32],
     shortest: float,
 ) -> tuple[ShadingMesh, Known]:
     """The mesh with edges cut down to `shortest` where values vary, and what is known of it.
 
-    seeds: places (N, 3) and values (N, C) that the vertices next to them are to have as well. Ends that look
-    different may have different values: paint follows looks by itself.
+    known: of a mesh, and what was known before it had its last vertices. seeds: places (N, 3) and values
+    (N, C) that the vertices next to them are to have as well. Ends that look different may have different
+    values: paint follows looks by itself.
     """
-    here = known(mesh)
+    here = known(mesh, None)
+    near, away = np.zeros(len(seeds[0]), np.int64), np.full(len(seeds[0]), np.inf)
+    first = 0
     for _ in range(ROUNDS):
         room = MOST - len(mesh)
         pairs = _pairs(mesh)
@@ -65,15 +69,17 @@ def finer(
         length = np.linalg.norm(_across(mesh.positions, pairs), axis=1)
         lonely = np.zeros(len(mesh), np.bool_)
         if len(seeds[0]):
-            near = cKDTree(mesh.positions).query(seeds[0])[1]
+            distance, found = cKDTree(mesh.positions[first:]).query(seeds[0])
+            near, away = np.where(distance < away, found + first, near), np.minimum(distance, away)
             lonely[near[np.abs(here.values[near] - seeds[1]).max(axis=1) > STEP]] = True
         marked = np.flatnonzero(((gap > STEP) | lonely[pairs].any(axis=1)) & (length > shortest))
         if not len(marked) or room <= 0:
             break
         if len(marked) > room:
             marked = marked[np.argsort(-length[marked], kind="stable")[:room]]
-        mesh = refined(mesh, marked=pairs[marked])[0]
-        here = known(mesh)
+        first = len(mesh)
+        mesh = places_between(mesh, pairs[marked])
+        here = known(mesh, here)
     return mesh, here
 
 
@@ -131,13 +137,22 @@ def _across(values: F32, pairs: I64) -> F32:
     return np.asarray(values[pairs[:, 0]] - values[pairs[:, 1]])
 
 
+@kernel
+def add_most_across(values: F32, pairs: I64, out: F32) -> None:
+    """out (N,) = the largest difference between the values (V, C) of pairs (N, 2), if it is larger."""
+    for n in range(len(pairs)):
+        for c in range(values.shape[1]):
+            out[n] = max(out[n], abs(values[pairs[n, 0], c] - values[pairs[n, 1], c]))
+
+
 def _gap(here: Known, pairs: I64) -> F32:
     """(N,) how much values differ of ends that look alike; 0 of others."""
-    made = np.abs(_across(here.values, pairs)).max(axis=1, initial=0)
+    made = np.zeros(len(pairs), np.float32)
+    add_most_across(here.values, pairs, made)
     if here.looks is not None:
         made[np.abs(_across(here.original, pairs)).max(axis=1) > UNLIKE] = 0
         made[~here.clear[pairs].all(axis=1)] = 0
-    return np.asarray(made)
+    return made
 
 
 def _sparse(mesh: ShadingMesh, some: I64) -> I64:

@@ -46,6 +46,13 @@ class Spots:
         """These of them."""
         return Spots(*(getattr(self, field.name)[which] for field in dataclasses.fields(self)))
 
+    def moved(self, which: I64, mesh: WorldMesh, index: int, places: F32, normals: F32) -> Spots:
+        """These of them (N,), at places (N, 3) and with normals (N, 3) in the frame of an object."""
+        turn, scale, shift = frame_of(mesh.objects[index].transform, mesh.origin)
+        place = (scale * (places.astype(np.float64) @ turn) + shift).astype(np.float32)
+        normal = (normals.astype(np.float64) @ turn).astype(np.float32)
+        return dataclasses.replace(self.some(which), place=place, normal=normal)
+
     @staticmethod
     def of_mesh(mesh: WorldMesh, looks: Looks, first: int = 0) -> Spots:
         """All vertices, whose looks are given; `first` is the number of the first object."""
@@ -79,9 +86,8 @@ def joined(parts: Sequence[Spots], like: Spots) -> Spots:
 
 def on_object(vertices: Spots, mesh: WorldMesh, index: int, places: F32, normals: F32, slots: I64) -> Spots:
     """Places (N, 3) in an object's own frame, that look as the nearest of its vertices do that face alike."""
-    turn, scale, shift = frame_of(mesh.objects[index].transform, mesh.origin)
-    place = (scale * (places.astype(np.float64) @ turn) + shift).astype(np.float32)
-    normal = (normals.astype(np.float64) @ turn).astype(np.float32)
+    none = np.zeros(len(places), np.int64)
+    there = vertices.moved(none, mesh, index, places, normals)
     parts = []
     for slot in np.unique(slots).tolist():
         own = vertices.some(vertices.part == index * SLOTS + slot)
@@ -89,12 +95,12 @@ def on_object(vertices: Spots, mesh: WorldMesh, index: int, places: F32, normals
         if not len(own):
             continue
         near = min(NEAR, len(own))
-        distance, found = cKDTree(own.place).query(place[here], k=near)
+        distance, found = cKDTree(own.place).query(there.place[here], k=near)
         distance, found = distance.reshape(len(here), near), found.reshape(len(here), near)
-        away = (own.normal[found] * normal[here, None]).sum(axis=2) <= 0
+        away = (own.normal[found] * there.normal[here, None]).sum(axis=2) <= 0
         best = np.argmin(np.where(away, np.inf, distance), axis=1)
         as_there = own.some(found[np.arange(len(here)), best])
-        parts.append(dataclasses.replace(as_there, place=place[here], normal=normal[here]))
+        parts.append(dataclasses.replace(as_there, place=there.place[here], normal=there.normal[here]))
     return joined(parts, vertices)
 
 

@@ -136,29 +136,39 @@ class Spread:
         follows = field.by_look or (under is not None and under.looks is not None)
         shown = pictures if follows else ()
 
-        def wanted(mesh: ShadingMesh) -> tuple[F32, Spots]:
-            there = vertices
-            if mesh is not placed.mesh:
-                one = Placed(placed.node, mesh, placed.transform, placed.materials)
-                alone = assemble([one], base.mesh.origin)
-                beside = dataclasses.replace(base, mesh=alone)
-                own = self._finer(scene, beside) if follows else self._finer.models(scene, beside)
-                there = Spots.of_mesh(alone, own, index)
-            made = columns.stack(field.at(there, self._workers), len(mesh))
-            if under is not None:
-                looks = None if under.looks is None else self._pictures.of_mesh(pictures, mesh)
-                weights = under.weights(mesh.positions, mesh.normals, mesh.slot, looks)
-                beneath = {name: weights(under.change(name)) for name in under.changes}
-                made = made + columns.stack(beneath, len(mesh))
-            return made, there
+        def wanted(mesh: ShadingMesh, there: Spots, first: int) -> F32:
+            """From the vertex `first` on, whose spots are given."""
+            made = columns.stack(field.at(there, self._workers), len(there))
+            if under is None:
+                return made
+            looks = None if under.looks is None else self._pictures.of_mesh(pictures, mesh)
+            new = mesh.positions[first:], mesh.normals[first:], mesh.slot[first:]
+            weights = under.weights(*new, looks)
+            return made + columns.stack(
+                {name: weights(under.change(name)) for name in under.changes}, len(there)
+            )
 
         seeds, told = self._seeds(field, columns, base, index, vertices, under)
-        plain = wanted(placed.mesh)
-        scale = columns.scale(np.concatenate([plain[0], told]))
+        plain = wanted(placed.mesh, vertices, 0)
+        scale = columns.scale(np.concatenate([plain, told]))
+        spots = vertices
 
-        def known(mesh: ShadingMesh) -> Known:
-            values, there = plain if mesh is placed.mesh else wanted(mesh)
-            return Known(values / scale, *self._looking(shown, mesh), there.look)
+        def known(mesh: ShadingMesh, before: Known | None) -> Known:
+            nonlocal spots
+            if before is None:
+                return Known(plain / scale, *self._looking(shown, mesh), vertices.look)
+            if follows:
+                alone = assemble(
+                    [Placed(placed.node, mesh, placed.transform, placed.materials)], base.mesh.origin
+                )
+                spots = Spots.of_mesh(alone, self._finer(scene, dataclasses.replace(base, mesh=alone)), index)
+                return Known(wanted(mesh, spots, 0) / scale, *self._looking(shown, mesh), spots.look)
+            first = len(before.values)
+            parents = mesh.parents[first:, 0].astype(np.int64)
+            new = spots.moved(parents, base.mesh, index, mesh.positions[first:], mesh.normals[first:])
+            spots = joined([spots, new], spots)
+            values = np.concatenate([before.values, wanted(mesh, new, first) / scale])
+            return Known(values, None, np.ones(len(mesh), np.bool_), spots.look)
 
         shortest = SHORTEST / placed.transform.scale
         mesh, here = finer(placed.mesh, known, (seeds, told / scale), shortest)

@@ -19,6 +19,7 @@ from studio_core.scene.shading_mesh import (
     ShadingMesh,
     choose_edge,
     prepare,
+    places_between,
     refine,
     rung,
     shade_mesh,
@@ -391,3 +392,14 @@ def test_a_scene_without_objects_and_a_budget_of_nothing() -> None:
     assert choose_edge([]) == 1.0
     with pytest.raises(ValueError, match="budget"):
         choose_edge([(floor(), 1.0)], 0)
+
+
+def test_places_between_are_those_of_a_refined_mesh() -> None:
+    mesh = shade_mesh(box(), 0.3)
+    for _ in range(3):
+        pairs = mesh.faces[:: max(len(mesh.faces) // 7, 1), :2]
+        finer, places = refine(mesh, marked=pairs), places_between(mesh, pairs)
+        for name in ("positions", "normals", "area", "slot", "welded", "parents", "faces", "back_faces"):
+            np.testing.assert_array_equal(getattr(places, name), getattr(finer, name), name)
+        mesh = finer
+    assert places_between(mesh, np.zeros((0, 2), int)) is mesh
