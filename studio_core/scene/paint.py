@@ -89,6 +89,24 @@ class Paint:
         values: F32 = self.changes[name].values[0, 0]
         return values
 
+    def only(self, names: Mapping[str, str]) -> Paint | None:
+        """The changes of some parameters alone, by what they shall be called; without slots they leave.
+
+        None if they change nothing.
+        """
+        changed = np.zeros(len(self.places), np.bool_)
+        for name in names.values():
+            changed |= self.change(name).any(axis=1)
+        if not changed.any():
+            return None
+        there = np.isin(self.slots, self.slots[changed])
+        tables = {new: self.changes[name] for new, name in names.items() if self.change(name).any()}
+        if there.all():
+            return Paint(self.points, frozen_map(tables), self.looks)
+        some = {name: table.values[0, 0, there] for name, table in tables.items()}
+        looks = None if self.looks is None else self.looks.values[0, 0, there]
+        return Paint.of(self.places[there], self.normals[there], self.slots[there], some, looks)
+
     @cached_property
     def key(self) -> str:
         """Content hash."""

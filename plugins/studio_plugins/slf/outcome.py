@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -31,17 +32,31 @@ from studio_plugins.slf.spread import Spread
 
 TOLD = 4
 """Reasons that are shown, each with its edit."""
+BESIDE = "/"
+"""Between a number and the name of a parameter, where several changes are laid at once."""
+
+
+@dataclass(frozen=True)
+class Instead:
+    """Another explanation of a region's last step than the best: its number among them."""
+
+    region: Region
+    number: int
 
 
 @dataclass(frozen=True, eq=False)
 class Canvas:
-    """What edits are made from: the scene, who lies where, how changes spread, and what was decided."""
+    """What edits are made from: the scene, who lies where, how changes spread, and what was decided.
+
+    `asked` are the strokes of which other explanations will be told.
+    """
 
     scene: Scene
     surfaces: Surfaces
     spread: Spread
     services: Services
     found: Mapping[Region, Painting]
+    asked: frozenset[NodeId]
 
     @property
     def whose(self) -> frozenset[NodeId]:
@@ -50,23 +65,51 @@ class Canvas:
         nodes.update(node for stroke in self._strokes() for node in stroke.reached)
         return frozenset(node for node in nodes if isinstance(self.scene.nodes.get(node), MeshObject))
 
+    def told(self, region: Region) -> tuple[Explanation, ...]:
+        """Explanations of a region's last step, if one of the asked strokes is in it."""
+        steps = self.found[region].steps
+        if not steps or self.asked.isdisjoint(stroke.id for stroke in steps[-1].strokes):
+            return ()
+        return steps[-1].verdict.explanations[:TOLD]
+
+    @cached_property
+    def laid(self) -> Mapping[Instead | None, Mapping[NodeId, Paint]]:
+        """Paint by object, of the best explanations (None), and with one of the others instead.
+
+        All of it lies on the same points: what is wanted differs by what changes, not by where.
+        """
+        every = [None] + [
+            Instead(region, number) for region in self.found for number in range(1, len(self.told(region)))
+        ]
+        scene = self.scene.with_materials(*(painting.dressed.material for painting in self.found.values()))
+        field = Field([layer for region in self.found for layer in self._layers(scene, region, every)])
+        made = self.spread(scene, self.surfaces, field) if field.layers else {}
+        alone = {
+            instead: {node: _alone(paint, number) for node, paint in made.items()}
+            for number, instead in enumerate(every)
+        }
+        return {
+            instead: {node: paint for node, paint in paints.items() if paint is not None}
+            for instead, paints in alone.items()
+        }
+
     def edit(
         self,
         label: str,
-        instead: Mapping[Region, Explanation] = frozen_map(),
+        instead: Instead | None = None,
         meanings: Mapping[NodeId, str] = frozen_map(),
     ) -> Solved:
-        """Paint on all regions, where the last steps of some end in other explanations than the best."""
+        """Paint on all regions, where the last step of one may end in another explanation than the best.
+
+        With `meanings` somebody chose it, be it the best.
+        """
         materials = {
             painting.was.id: painting.dressed.material
             for painting in self.found.values()
-            if painting.changes or instead
+            if painting.changes or meanings or instead is not None
         }
         scene = self.scene.with_materials(*materials.values())
-        field = Field(
-            [layer for region in self.found for layer in self._layers(scene, region, instead.get(region))]
-        )
-        made = self.spread(scene, self.surfaces, field) if field.layers else {}
+        made = self.laid[instead]
         others = {node for stroke in scene.of(Stroke) if not stroke.hidden for node in stroke.objects}
         paints: dict[NodeId, Paint | None] = dict.fromkeys(self.whose)
         for node, paint in made.items():
@@ -97,20 +140,32 @@ class Canvas:
         steps = [step for painting in self.found.values() for step in painting.steps]
         return [*{stroke.id: stroke for step in steps for stroke in step.strokes}.values()]
 
-    def _layers(self, scene: Scene, region: Region, last: Explanation | None) -> Iterator[Layer]:
+    def _layers(self, scene: Scene, region: Region, every: Sequence[Instead | None]) -> Iterator[Layer]:
+        """The steps on a region, each with the changes of all that may be instead, side by side."""
         painting = self.found[region]
         part = self.surfaces.unrefined.mesh.index_of(region.node) * SLOTS + region.slot
         for step in painting.steps:
-            one = step.verdict.best if last is None or step is not painting.steps[-1] else last
-            changes = painting.dressed.changes(step.now, step.gloss, one.reflectance, one.change)
+            changes: dict[str, F64] = {}
+            for number, instead in enumerate(every):
+                one = step.verdict.best
+                if instead is not None and instead.region == region and step is painting.steps[-1]:
+                    one = step.verdict.explanations[instead.number]
+                own = painting.dressed.changes(step.now, step.gloss, one.reflectance, one.change)
+                changes |= {f"{number}{BESIDE}{name}": change for name, change in own.items()}
             layer = []
             for stroke in step.strokes if changes else ():
                 marks = self.spread.marks(scene, self.surfaces, stroke)
-                own = marks.some(marks.part == part)
-                if stroke.tool != FIXATE and len(own):
-                    layer.append(Decided(own, Reach.of(stroke), changes))
+                there = marks.some(marks.part == part)
+                if stroke.tool != FIXATE and len(there):
+                    layer.append(Decided(there, Reach.of(stroke), changes))
             if layer:
                 yield layer
+
+
+def _alone(paint: Paint, number: int) -> Paint | None:
+    """One of several changes that were laid at once."""
+    before = f"{number}{BESIDE}"
+    return paint.only({name.removeprefix(before): name for name in paint.changes if name.startswith(before)})
 
 
 def _with_offsets(table: Any, offsets: Sequence[tuple[npt.NDArray[np.int64], F64]]) -> Any:
@@ -123,18 +178,19 @@ def _with_offsets(table: Any, offsets: Sequence[tuple[npt.NDArray[np.int64], F64
     return dataclasses.replace(marks, offset=made).table()
 
 
-def finding_of(canvas: Canvas, region: Region, asked: set[NodeId]) -> Finding | None:
+def finding_of(canvas: Canvas, region: Region) -> Finding | None:
     """Of the last step, if one of the asked strokes is in it."""
-    painting = canvas.found[region]
-    if not painting.steps or asked.isdisjoint(stroke.id for stroke in painting.steps[-1].strokes):
+    painting, explanations = canvas.found[region], canvas.told(region)
+    if not explanations:
         return None
     step = painting.steps[-1]
     reasons = []
-    who = [stroke for stroke in step.strokes if stroke.tool != FIXATE and stroke.id in asked]
-    for one in step.verdict.explanations[:TOLD]:
+    who = [stroke for stroke in step.strokes if stroke.tool != FIXATE and stroke.id in canvas.asked]
+    for number, one in enumerate(explanations):
         word = WORDS[one.change]
         meanings = {stroke.id: word for stroke in who} if word else {}
-        edit = canvas.edit(told(canvas.scene, region.node, word), {region: one}, meanings)
+        instead = Instead(region, number) if number else None
+        edit = canvas.edit(told(canvas.scene, region.node, word), instead, meanings)
         values = painting.dressed.values(one.reflectance)
         reasons.append(Reason(word, one.explained, one.score, frozen_map(values), edit))
     silent = tuple(WORDS[c] for c in SINGLE[1:] if c in step.verdict.silent and c in painting.dressed.can)

@@ -80,10 +80,10 @@ class JointRun:
         found, unpaintable = self.decided(scene, asked, lit, params, job)
         notes = [f"{stroke.name} lies on no surface" for stroke in asked if not regions_of(stroke)]
         notes += unpaintable
-        canvas = Canvas(scene, lit.surfaces, self._spread, self._services, found)
+        names = frozenset(stroke.id for stroke in asked)
+        canvas = Canvas(scene, lit.surfaces, self._spread, self._services, found, names)
         edit = canvas.edit(label_of(scene, asked, found))
-        names = {stroke.id for stroke in asked}
-        every = (finding_of(canvas, region, names) for region in found)
+        every = (finding_of(canvas, region) for region in found)
         findings = [finding for finding in every if finding is not None]
         counts = {
             "places": sum(step.places for painting in found.values() for step in painting.steps),

@@ -236,3 +236,20 @@ def test_marks_on_objects_that_are_gone_reach_nothing(services):
     nobody = vertices.some(np.zeros(0, np.int64))
     assert spread(stand.scene, stand.surfaces, Field([[Decided(nobody, Reach(), RED)]])) == {}
     assert spread(stand.scene, stand.surfaces, Field()) == {}
+
+
+def test_several_changes_are_laid_at_once_on_the_points_of_one(services):
+    stand = Stand(room(), 3000)
+    spread = Spread(services)
+    marks = disc(stand, spread.spots(stand.scene, stand.surfaces), 0, (0.5, 0, 0.5), 0.25)
+
+    def paint(changes):
+        return spread(stand.scene, stand.surfaces, Field([[Decided(marks, Reach(near=20.0), changes)]]))[
+            "floor"
+        ]
+
+    alone, both = paint(RED), paint({"0/base_color": RED["base_color"], "1/roughness": 0.3})
+    same = both.only({"base_color": "0/base_color"})
+    np.testing.assert_array_equal(same.places, alone.places)
+    np.testing.assert_array_equal(same.change("base_color"), alone.change("base_color"))
+    assert set(both.only({"roughness": "1/roughness"}).changes) == {"roughness"}

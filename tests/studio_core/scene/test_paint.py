@@ -80,3 +80,17 @@ def test_equal_paint_has_one_key():
         return Paint.of(np.zeros((2, 3)), np.ones((2, 3)), np.zeros(2), {"roughness": [value, 0.0]})
 
     assert made(0.5).key == made(0.5).key != made(0.6).key
+
+
+def test_some_changes_alone_leave_out_slots_that_they_do_not_touch():
+    places, up = np.arange(9.0).reshape(3, 3), np.tile([0.0, 1.0, 0.0], (3, 1))
+    one, other = np.array([[0.1], [0.0], [0.0]]), np.array([[0.0], [0.0], [0.5]])
+    looks = np.full((3, 3), 0.5)
+    paint = Paint.of(places, up, [0, 0, 1], {"1/a": one, "2/a": other, "2/b": 0 * one}, looks)
+    first, second = paint.only({"a": "1/a"}), paint.only({"a": "2/a", "b": "2/b"})
+    np.testing.assert_array_equal(first.places, places[:2])
+    np.testing.assert_allclose(first.change("a")[:, 0], [0.1, 0.0])
+    np.testing.assert_array_equal(second.slots, [1])
+    assert set(second.changes) == {"a"}
+    assert first.looks is not None
+    assert paint.only({"b": "2/b"}) is None
