@@ -156,10 +156,11 @@ def _give(
     values: F32,
 ) -> None:
     """Values of the pairs of elements start … stop − 1: first matte light, then what each term sends."""
-    series = whole.incident(field, start, stop)
+    shiny = bool(own[:, :, 1].any())
+    series = whole.incident(field, start, stop) if shiny else np.zeros((0, 3), np.float32)
     pairs = slice(splats.start[start], splats.start[stop])
     element = np.repeat(np.arange(stop - start), np.diff(splats.start[start : stop + 1]))
-    matte = matte_of(series)[element]
+    matte = (matte_of(series) if shiny else whole.matte(field, start, stop))[element]
     values[pairs, 0] = matte
     sent, out = np.zeros_like(series), np.zeros((len(splats.vertex[pairs]), 3), np.float32)
     for term in range(own.shape[1]):

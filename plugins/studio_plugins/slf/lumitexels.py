@@ -2,7 +2,8 @@
 
 Rows (E · CELLS + SKY + 1): elements' cells, then the environment's rows (`skylight`), then one that is black.
 So the light that arrives is one indirect read, wherever it comes from. Blocks of CELLS rows share a power of
-two, so that neither a sun's image nor a dark corner leaves the range of 16 bits.
+two, so that neither a sun's image nor a dark corner leaves the range of 16 bits. What sends the same to all
+its cells has one row, which stays near at hand: matte surface, and all that no light has reached.
 """
 
 from __future__ import annotations
@@ -30,11 +31,14 @@ class LightField:
         rows = self.rows_of(elements)
         self.bits: U16 = np.zeros((rows, 3), np.uint16)
         self.scale: F32 = np.ones(-(-rows // CELLS), np.float32)
+        self._own: U32 = np.zeros(len(self.scale), np.uint32)
+        """Bits of a row's number that tell cells of its block apart: none where all are alike."""
+        self._own[elements:] = CELLS - 1
 
     @property
     def nbytes(self) -> int:
         """Memory of what is kept."""
-        return self.bits.nbytes + self.scale.nbytes
+        return self.bits.nbytes + self.scale.nbytes + self._own.nbytes
 
     @staticmethod
     def rows_of(elements: int) -> int:
@@ -48,6 +52,15 @@ class LightField:
         scaled = np.maximum(light.reshape(len(light), 3, CELLS), 0)
         scaled *= (_SMALLER / scale)[:, None, None]
         _pack(scaled.view(np.uint32), start * CELLS, self.bits)
+        self._own[start : start + len(light)] = CELLS - 1
+
+    def keep_even(self, start: int, light: F32) -> None:
+        """Light (N, 3) ≥ 0 that elements start … start + N − 1 send to all their cells."""
+        stop = start + len(light)
+        scale = _scales(light.max(axis=1))
+        halves = (light / scale[:, None]).astype(np.float16)
+        self.scale[start:stop], self._own[start:stop] = scale, 0
+        self.bits[start * CELLS : stop * CELLS : CELLS] = halves.view(np.uint16)
 
     def keep_sky(self, light: F32) -> None:
         """The environment's rows (SKY, 3)."""
@@ -65,7 +78,7 @@ class LightField:
     def read(self, rows: U32, out: F32) -> None:
         """out (N, 3, RINGS, PARTS), of rows (N, CELLS)."""
         made = out.reshape(-1, 3, CELLS)
-        gather(rows, self.bits, self.scale, made.view(np.uint32), made)
+        gather(rows, self.bits, self.scale, self._own, made.view(np.uint32), made)
 
     def of(self, start: int, stop: int) -> F32:
         """(N, 3, RINGS, PARTS) of some elements."""
@@ -95,15 +108,16 @@ def _pack(words: U32, first: int, bits: U16) -> None:
 
 
 @kernel
-def gather(rows: U32, bits: U16, scale: F32, words: U32, light: F32) -> None:
+def gather(rows: U32, bits: U16, scale: F32, own: U32, words: U32, light: F32) -> None:
     """light (N, 3, CELLS), whose memory `words` is, of rows (N, CELLS)."""
     cells = rows.shape[1]
     larger = np.float32(_LARGER)
     share = np.empty(cells, np.float32)
     for n in range(len(rows)):
         for i in range(cells):
-            row = rows[n, i]
-            share[i] = scale[row >> np.uint32(10)] * larger
+            block = rows[n, i] >> np.uint32(10)
+            share[i] = scale[block] * larger
+            row = (block << np.uint32(10)) | (rows[n, i] & own[block])
             words[n, 0, i] = np.uint32(bits[row, 0]) << np.uint32(13)
             words[n, 1, i] = np.uint32(bits[row, 1]) << np.uint32(13)
             words[n, 2, i] = np.uint32(bits[row, 2]) << np.uint32(13)

@@ -155,6 +155,15 @@ class Whole:
         self._straight.add_to(series, start, self.frames[start:stop])
         return series
 
+    def matte(self, field: LightField, start: int, stop: int) -> F64:
+        """(N, 3) what elements start … stop − 1 send where they are white and matte, without the series."""
+        light = np.empty((stop - start, 3, RINGS, PARTS), np.float32)
+        field.read(self.links[start:stop], light)
+        means = np.zeros((*light.shape[:-1], 2), np.float32)  # no wave but the one that is even
+        means[..., 0] = light.sum(axis=-1)
+        self._straight.add_to(means, start, self.frames[start:stop])
+        return matte_of(means)
+
     def sent(self, series: F32, of: Reflectances, start: int) -> F32:
         """The series of what elements from `start` on send of the incident light's."""
         own = slice(start, start + len(series))
@@ -172,7 +181,11 @@ class Whole:
         made.copy_sky(field)
 
         def body(start: int, stop: int) -> None:
-            made.keep(start, light_of(self.sent(self.incident(field, start, stop), of, start)))
+            if of.specular[start:stop].any():
+                made.keep(start, light_of(self.sent(self.incident(field, start, stop), of, start)))
+            else:
+                even = self.matte(field, start, stop) * of.diffuse[start:stop]
+                made.keep_even(start, np.maximum(even, 0).astype(np.float32))
 
         self._workers.run(len(self.elements), CHUNK, body, job)
         return made

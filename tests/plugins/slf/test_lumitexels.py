@@ -28,6 +28,19 @@ def test_what_is_kept_is_read_again_whatever_its_range():
     assert not field.of(8, 9).any()
 
 
+def test_what_sends_the_same_everywhere_is_read_in_every_cell():
+    rng = np.random.default_rng(3)
+    even = (10.0 ** rng.uniform(-6, 6, (4, 1)) * rng.uniform(0, 1, (4, 3))).astype(np.float32)
+    field, plain = LightField(6), LightField(6)
+    field.keep(0, rng.uniform(0, 1, (6, 3, RINGS, PARTS)).astype(np.float32))
+    field.keep_even(1, even)
+    plain.keep(1, np.broadcast_to(even[..., None, None], (4, 3, RINGS, PARTS)))
+    np.testing.assert_array_equal(field.of(1, 5), plain.of(1, 5))
+    assert np.ptp(field.of(0, 1)) > 0
+    field.keep(1, np.zeros((1, 3, RINGS, PARTS), np.float32))
+    assert not field.of(1, 2).any()
+
+
 def test_light_below_zero_is_none():
     field = LightField(1)
     field.keep(0, np.full((1, 3, RINGS, PARTS), -1, np.float32))
