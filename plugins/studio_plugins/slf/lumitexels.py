@@ -3,7 +3,7 @@
 Rows (E · CELLS + SKY + 1): elements' cells, then the environment's rows (`skylight`), then one that is black.
 So the light that arrives is one indirect read, wherever it comes from. Blocks of CELLS rows share a power of
 two, so that neither a sun's image nor a dark corner leaves the range of 16 bits. What sends the same to all
-its cells has one row, which stays near at hand: matte surface, and all that no light has reached.
+its cells has one row beyond these, among others of its kind: matte surface, and what no light has reached.
 """
 
 from __future__ import annotations
@@ -29,16 +29,18 @@ class LightField:
     def __init__(self, elements: int) -> None:
         self.elements = elements
         rows = self.rows_of(elements)
-        self.bits: U16 = np.zeros((rows, 3), np.uint16)
+        self.bits: U16 = np.zeros((rows + elements, 3), np.uint16)
         self.scale: F32 = np.ones(-(-rows // CELLS), np.float32)
-        self._own: U32 = np.zeros(len(self.scale), np.uint32)
-        """Bits of a row's number that tell cells of its block apart: none where all are alike."""
-        self._own[elements:] = CELLS - 1
+        self._first: U32 = np.arange(0, rows, CELLS, dtype=np.uint32)
+        """Where each block begins in `bits`."""
+        self._cells: U32 = np.full(len(self.scale), CELLS - 1, np.uint32)
+        """Bits of a row's number that tell the cells of its block apart: none where all are alike."""
+        self._turn_even(0, elements)
 
     @property
     def nbytes(self) -> int:
         """Memory of what is kept."""
-        return self.bits.nbytes + self.scale.nbytes + self._own.nbytes
+        return self.bits.nbytes + self.scale.nbytes + self._first.nbytes + self._cells.nbytes
 
     @staticmethod
     def rows_of(elements: int) -> int:
@@ -52,15 +54,22 @@ class LightField:
         scaled = np.maximum(light.reshape(len(light), 3, CELLS), 0)
         scaled *= (_SMALLER / scale)[:, None, None]
         _pack(scaled.view(np.uint32), start * CELLS, self.bits)
-        self._own[start : start + len(light)] = CELLS - 1
+        stop = start + len(light)
+        self._first[start:stop] = np.arange(start * CELLS, stop * CELLS, CELLS)
+        self._cells[start:stop] = CELLS - 1
 
     def keep_even(self, start: int, light: F32) -> None:
         """Light (N, 3) ≥ 0 that elements start … start + N − 1 send to all their cells."""
         stop = start + len(light)
         scale = _scales(light.max(axis=1))
         halves = (light / scale[:, None]).astype(np.float16)
-        self.scale[start:stop], self._own[start:stop] = scale, 0
-        self.bits[start * CELLS : stop * CELLS : CELLS] = halves.view(np.uint16)
+        self._turn_even(start, stop)
+        self.scale[start:stop] = scale
+        self.bits[self._first[start:stop]] = halves.view(np.uint16)
+
+    def _turn_even(self, start: int, stop: int) -> None:
+        beyond = self.rows_of(self.elements)
+        self._first[start:stop], self._cells[start:stop] = np.arange(beyond + start, beyond + stop), 0
 
     def keep_sky(self, light: F32) -> None:
         """The environment's rows (SKY, 3)."""
@@ -73,12 +82,13 @@ class LightField:
     def copy_sky(self, other: LightField) -> None:
         """The environment of another field of as many elements."""
         first = self.elements
-        self.bits[first * CELLS :], self.scale[first:] = other.bits[first * CELLS :], other.scale[first:]
+        sky = slice(first * CELLS, self.rows_of(first))
+        self.bits[sky], self.scale[first:] = other.bits[sky], other.scale[first:]
 
     def read(self, rows: U32, out: F32) -> None:
         """out (N, 3, RINGS, PARTS), of rows (N, CELLS)."""
         made = out.reshape(-1, 3, CELLS)
-        gather(rows, self.bits, self.scale, self._own, made.view(np.uint32), made)
+        gather(rows, self.bits, self.scale, self._first, self._cells, made.view(np.uint32), made)
 
     def of(self, start: int, stop: int) -> F32:
         """(N, 3, RINGS, PARTS) of some elements."""
@@ -108,7 +118,7 @@ def _pack(words: U32, first: int, bits: U16) -> None:
 
 
 @kernel
-def gather(rows: U32, bits: U16, scale: F32, own: U32, words: U32, light: F32) -> None:
+def gather(rows: U32, bits: U16, scale: F32, first: U32, own: U32, words: U32, light: F32) -> None:
     """light (N, 3, CELLS), whose memory `words` is, of rows (N, CELLS)."""
     cells = rows.shape[1]
     larger = np.float32(_LARGER)
@@ -117,7 +127,7 @@ def gather(rows: U32, bits: U16, scale: F32, own: U32, words: U32, light: F32) -
         for i in range(cells):
             block = rows[n, i] >> np.uint32(10)
             share[i] = scale[block] * larger
-            row = (block << np.uint32(10)) | (rows[n, i] & own[block])
+            row = first[block] + (rows[n, i] & own[block])
             words[n, 0, i] = np.uint32(bits[row, 0]) << np.uint32(13)
             words[n, 1, i] = np.uint32(bits[row, 1]) << np.uint32(13)
             words[n, 2, i] = np.uint32(bits[row, 2]) << np.uint32(13)
