@@ -34,8 +34,7 @@ from studio_core.shading.stages import SurfaceParams, common_stages
 from studio_core.transport.operator import Transport
 from studio_core.transport.patterns import cosine_pattern
 from studio_plugins.slf.appearance import Appearance
-from studio_plugins.slf.lumitexels import LightField
-from studio_plugins.slf.series import convolve, half_kernels, half_level, light_of, matte_of
+from studio_plugins.slf.preconvolved import Preconvolved
 from studio_plugins.slf.splatting import Splats, blocks, look_up, views
 from studio_plugins.slf.whole import BURIED, CHUNK, Whole
 
@@ -68,10 +67,16 @@ class ElementStage:
         self._workers = services.workers
         self._appearance = Appearance()
         self._whole: Whole | None = None
+        self._light = Preconvolved(services.workers)
         self._count = 0
         self._few = Transport(services.workers, cosine_pattern(FEW))
         self._inside = np.zeros(0, np.bool_)
         self._bits: VisibilityBits | None = None
+
+    @property
+    def nbytes(self) -> int:
+        """Memory of elements and of what they make of the sky's light."""
+        return self._light.nbytes + (0 if self._whole is None else self._whole.nbytes)
 
     def run(self, frame: Frame, inputs: Inputs, job: Job) -> Radiance:
         """All layers at unit gain; raises Cancelled at checkpoints."""
@@ -129,13 +134,14 @@ class ElementStage:
         splats = Splats.of(mesh, whole.elements, points, rows, self._inside)
         known = self._appearance.rows(shapes)
         own = np.where((rows >= 0)[:, None, None], known[np.maximum(rows, 0)], 0)[whole.elements.vertex]
-        to_eye, field = views(mesh, points, eye), whole.dark()
+        to_eye, light = views(mesh, points, eye), self._light
+        light.update(whole, own, splats.used)
         values = np.zeros((len(splats.vertex), 1 + own.shape[1], 3), np.float32)
         todo = blocks(splats.used, CHUNK)
 
         def body(first: int, last: int) -> None:
             for start, stop in todo[first:last]:
-                _give(whole, field, own[start:stop], splats, to_eye, start, stop, values)
+                _give(light, whole.frames, own[start:stop], splats, to_eye, start, stop, values)
 
         self._workers.run(len(todo), 4, body)
         sums = splats.sums(values)
@@ -146,8 +152,8 @@ class ElementStage:
 
 
 def _give(
-    whole: Whole,
-    field: LightField,
+    light: Preconvolved,
+    frames: F32,
     own: F64,
     splats: Splats,
     to_eye: F32,
@@ -156,19 +162,16 @@ def _give(
     values: F32,
 ) -> None:
     """Values of the pairs of elements start … stop − 1: first matte light, then what each term sends."""
-    shiny = bool(own[:, :, 1].any())
-    series = whole.incident(field, start, stop) if shiny else np.zeros((0, 3), np.float32)
     pairs = slice(splats.start[start], splats.start[stop])
     element = np.repeat(np.arange(stop - start), np.diff(splats.start[start : stop + 1]))
-    matte = (matte_of(series) if shiny else whole.matte(field, start, stop))[element]
+    matte = light.matte[start:stop][element]
     values[pairs, 0] = matte
-    sent, out = np.zeros_like(series), np.zeros((len(splats.vertex[pairs]), 3), np.float32)
+    out = np.zeros((len(element), 3), np.float32)
     for term in range(own.shape[1]):
         values[pairs, 1 + term] = matte * own[element, term, :1]
         if own[:, term, 1].any():
-            convolve(series, half_kernels(), half_level(own[:, term, 2]), sent)
-            frames = whole.frames[start:stop]
-            look_up(light_of(sent), frames, element, splats.vertex[pairs], to_eye, out)
+            sent = light.sent(term, start, stop)
+            look_up(sent, frames[start:stop], element, splats.vertex[pairs], to_eye, out)
             values[pairs, 1 + term] += (own[element, term, 1:2] * out).astype(np.float32)
 
 

@@ -99,6 +99,11 @@ class Whole:
         own = self._transport.nbytes + self.links.nbytes + self.frames.nbytes + self.elements.owner.nbytes
         return own + self._straight.nbytes + sky
 
+    @property
+    def state(self) -> tuple[object, ...]:
+        """Other objects than before where the environment brings other light, lamps and suns apart."""
+        return self.links, self._sky, self._gain
+
     def update(
         self,
         surfaces: Surfaces,
@@ -138,7 +143,8 @@ class Whole:
             return
         if lighting.integrated != self._lit:
             self._sky, self._lit = averages(lighting.tree, self._workers, job), lighting.integrated
-        self._gain = np.asarray(shown.gain(), np.float32)
+        gain = np.asarray(shown.gain(), np.float32)
+        self._gain = self._gain if np.array_equal(gain, self._gain) else gain
 
     def dark(self) -> LightField:
         """What is sent before any light was reflected: the environment alone."""
