@@ -1,11 +1,11 @@
 """The part of `lucarne bench strokes` about one stroke: case `size/direct-stroke`, in the sample room.
 
-500 marks on an object whose picture with another gloss is painted, 20 levels, 27,000 vertices, light between
-surfaces as it is at rest. `ms` and `cpu_ms` are from release to decided parameters, where what vertices see
-is kept, as it is of what the hand has painted until then; `first_ms` of a stroke that must look around first.
-`solution_ms` is all that the window asks for, with the paint of the decision and of runners-up; `near_ms`
-likewise for a change that fades out within 5 cm. Parts, in time of all processors: `light`, `columns`,
-`decision`, and `laid`, the paint.
+About 500 marks on an object whose picture with another gloss is painted, 20 levels, 27,000 vertices, light
+between surfaces as it is at rest. `ms` and `cpu_ms` are from release to decided parameters, where what
+vertices see is kept, as it is of what the hand has painted until then; `first_ms` of a stroke that must look
+around first. `solution_ms` is all that the window asks for, with the paint of the decision and of runners-up;
+`near_ms` likewise for a change that fades out within 5 cm. Parts, in time of all processors: `light`,
+`columns`, `decision`, and `laid`, the paint.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ from studio_plugins.slf.spread import Spread
 
 CASE = "size/direct-stroke"
 NODE = "mesh-sofa-seat-cushion-middle"
-MARKS = 500
+MARKS = 600  # at most; about 520 it is
 QUALITY = {"directions": "1024", "vertices": "27000", "refine": "false"}
 BEFORE: dict[str, Value] = {"diffuse": (0.35, 0.3, 0.22), "specular": (0.12,) * 3, "roughness": 0.35}
 AFTER: dict[str, Value] = {**BEFORE, "roughness": 0.22}
@@ -106,8 +106,6 @@ def direct(report: Report, program: Headless) -> None:
         report.add(CASE, f"{prefix}points", 0 if painted is None else len(painted.places), "1")
     for metric, count in solution.counts.items():
         report.add(CASE, metric, count, "1")
-    reasons = solution.findings[0].reasons
-    report.add(CASE, "right_parameter", float(reasons[0].meaning == "gloss"), "1")
 
 
 def stand_of(program: Headless) -> Stand:

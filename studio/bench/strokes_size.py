@@ -2,8 +2,8 @@
 
 `size/visibility` rays and links, `size/full-solve` light, tool, moments of 20 levels and the mixed choice,
 `size/three-bounces`, `size/splatting` a frame's picture of the sky when the eye moves (`first_ms`: when light
-or shapes have), `size/memory` what all of it keeps. `ms`
-is wall time, `cpu_ms` the time of all processors, both the least of some repeats: machines are shared.
+or shapes have), `size/memory` what all of it keeps. `ms` is wall time, `cpu_ms` the time of all processors,
+both the least of some repeats: machines are shared.
 """
 
 from __future__ import annotations

@@ -66,7 +66,8 @@ def finer(
         room = MOST - len(mesh)
         pairs = _pairs(mesh)
         gap = _gap(here, pairs)
-        length = np.linalg.norm(_across(mesh.positions, pairs), axis=1)
+        length = np.zeros(len(pairs), np.float32)
+        add_lengths(mesh.positions, pairs, length)
         lonely = np.zeros(len(mesh), np.bool_)
         if len(seeds[0]):
             distance, found = cKDTree(mesh.positions[first:]).query(seeds[0])
@@ -135,6 +136,17 @@ def _pairs(mesh: ShadingMesh) -> I64:
 
 def _across(values: F32, pairs: I64) -> F32:
     return np.asarray(values[pairs[:, 0]] - values[pairs[:, 1]])
+
+
+@kernel
+def add_lengths(places: F32, pairs: I64, out: F32) -> None:
+    """out (N,) += how far apart the places (V, 3) of pairs (N, 2) are."""
+    for n in range(len(pairs)):
+        square = np.float32(0)
+        for c in range(3):
+            difference = places[pairs[n, 0], c] - places[pairs[n, 1], c]
+            square += difference * difference
+        out[n] += np.sqrt(square)
 
 
 @kernel

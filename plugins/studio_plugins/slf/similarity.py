@@ -22,6 +22,7 @@ and then by ELSEWHERE at least: surface that looks the same, whatever it is call
 from __future__ import annotations
 
 from dataclasses import dataclass
+from weakref import WeakKeyDictionary
 
 import numpy as np
 import numpy.typing as npt
@@ -103,6 +104,16 @@ def _strictness(spots: Spots, marks: Spots, reach: Reach) -> F32:
 
 
 def _thinned(marks: Spots) -> tuple[Spots, F32]:
+    """As `_thin` makes them, once for the same marks."""
+    if marks not in _known:
+        _known[marks] = _thin(marks)
+    return _known[marks]
+
+
+_known: WeakKeyDictionary[Spots, tuple[Spots, F32]] = WeakKeyDictionary()
+
+
+def _thin(marks: Spots) -> tuple[Spots, F32]:
     """At most MOST of them, in the order of a curve that fills space, and how far around each counts (N,)."""
     low = marks.place.min(axis=0)
     size = max(float((marks.place - low).max()), 1e-9)
@@ -116,7 +127,7 @@ def _thinned(marks: Spots) -> tuple[Spots, F32]:
         order = order[np.linspace(0, len(order) - 1, MOST).astype(np.int64)]
     near = min(4, len(marks))
     if near == 1:
-        return marks, np.zeros(1, np.float32)
+        return marks.some(np.arange(1)), np.zeros(1, np.float32)
     place = marks.place[order]
     gap = cKDTree(marks.place).query(place, k=near)[0][:, 1:].mean(axis=1)
     gap = np.minimum(gap, ALONE * np.median(gap))
