@@ -1,9 +1,9 @@
 """All elements at the paper's size: `size/…`, among furniture (27,000 vertices, 10,000 elements).
 
 `size/visibility` rays and links, `size/full-solve` light, tool, moments of 20 levels and the mixed choice,
-`size/three-bounces`, `size/splatting` a frame's picture of the sky when the eye moves (`first_ms`: when light
-or shapes have), `size/memory` what all of it keeps. `ms` is wall time, `cpu_ms` the time of all processors,
-both the least of some repeats: machines are shared.
+`size/three-bounces`, `size/splatting` a frame's picture of the sky once the eye has moved, `size/memory` what
+all of it keeps. `ms` is wall time, `cpu_ms` the time of all processors, both the least of some repeats:
+machines are shared.
 """
 
 from __future__ import annotations
@@ -126,10 +126,6 @@ def _splatting(report: Report, stand: Stand, program: Headless) -> None:
     stage.follow(surfaces, stand.get(Casters), stand.get(Lighting), elements, Job("bench"))
     points = np.flatnonzero(visible_vertices(surfaces, hits))
     eye = np.array([0.3, 1.5, 5.4]) - surfaces.mesh.origin
-    started, before = time.perf_counter(), time.process_time()
-    stage.splatted(surfaces, shapes, points, eye)
-    report.add("size/splatting", "first_ms", 1000 * (time.perf_counter() - started), "ms")
-    report.add("size/splatting", "first_cpu_ms", 1000 * (time.process_time() - before), "ms")
     _least(report, "size/splatting", lambda: stage.splatted(surfaces, shapes, points, eye))
     report.add("size/splatting", "vertices", len(points), "1")
     report.add("size/splatting", "bytes", stage.nbytes, "B")
