@@ -9,6 +9,7 @@ the direction that most of their light comes from.
 
 from __future__ import annotations
 
+import functools
 import math
 
 import numpy as np
@@ -49,15 +50,10 @@ def sums_at(
     out = np.zeros((len(shapes), count, terms, 3))
     given_shapes = np.ascontiguousarray(shapes, np.float32)
     sharp = np.array([alpha_of_level(level) < SHARP for level in range(len(shapes))])
-    cells = SIDE * SIDE
-    whole, quarters, sixteenths = (
-        np.ascontiguousarray(grid_pattern(SIDE * side).directions[0].reshape(cells, side * side, 3))
-        for side in (1, 2, 4)
-    )
     given = (
         np.ascontiguousarray(places.axes, np.float64), np.ascontiguousarray(places.wo, np.float32),
         light.row.astype(np.int64), light.axes, light.light, light.open, light.sky,
-        averaged(light.sky, OF_QUARTERS), light.towards, light.strength, whole, quarters, sixteenths,
+        averaged(light.sky, OF_QUARTERS), light.towards, light.strength, *_parts(),
     )  # fmt: skip
     angles = np.cos([FINE, MIDDLE, FAR])
 
@@ -66,6 +62,16 @@ def sums_at(
 
     workers.run(count, 8, body, job)
     return out
+
+
+@functools.cache
+def _parts() -> tuple[F32, F32, F32]:
+    """Directions (1024, P, 3) of cells, of their 4 and of their 16 parts."""
+    whole, quarters, sixteenths = (
+        np.ascontiguousarray(grid_pattern(SIDE * side).directions[0].reshape(SIDE * SIDE, side * side, 3))
+        for side in (1, 2, 4)
+    )
+    return whole, quarters, sixteenths
 
 
 @kernel

@@ -14,6 +14,7 @@ from studio_plugins.slf.ladder import alpha_of_level
 from studio_plugins.slf.places import Places
 
 CELLS = grid_pattern(32).directions[0]
+PARTS = {side: grid_pattern(32 * side).directions[0].reshape(1024, -1, 3) for side in (2, 4)}
 SOLID = 2 * np.pi / 1024
 COUNT, ROWS, LAMPS = 5, 3, 4
 
@@ -61,15 +62,16 @@ def plainly(address, terms, shape, light, places, n, sharp):
     local = CELLS @ light.axes[row] @ places.axes[n].T
     cosine = local @ (places.wo[n] * [-1, -1, 1])
     directions, weights = [], []
+    skies = {2: averaged(light.sky, 13), 4: averaged(light.sky, 15)} if len(light.sky) else {}
     for cell in range(1024):
         block = slice(cell // 4 * 4, cell // 4 * 4 + 4)
         if sharp and cosine[cell] > np.cos(MIDDLE):
             side = 4 if cosine[cell] > np.cos(FINE) else 2
-            for part in grid_pattern(32 * side).directions[0].reshape(1024, -1, 3)[cell] @ light.axes[row]:
+            for part in PARTS[side][cell] @ light.axes[row]:
                 seen = light.light[row, cell]
-                if light.open[row, cell] and len(light.sky):
-                    k = min(len(light.sky).bit_length() - 1, 15 if side == 4 else 13)
-                    seen = averaged(light.sky, k)[direction_set(k).leaf_of(part)[0]]
+                if light.open[row, cell] and skies:
+                    k = len(skies[side]).bit_length() - 1
+                    seen = skies[side][direction_set(k).leaf_of(part)[0]]
                 towards = places.axes[n] @ part
                 directions.append(towards)
                 weights.append(seen * max(towards[2], 0) * SOLID / side**2)
