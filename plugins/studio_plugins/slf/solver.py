@@ -24,6 +24,7 @@ from studio_core.strokes.solution import Lit, Reason, Solution
 from studio_core.strokes.solved import Solved
 from studio_core.strokes.stroke import FIXATE, Stroke
 from studio_plugins.slf.columns import sums_at
+from studio_plugins.slf.corners import Corners, lamp_sums
 from studio_plugins.slf.dressed import Dressed
 from studio_plugins.slf.explaining import (
     Painting,
@@ -35,7 +36,7 @@ from studio_plugins.slf.explaining import (
     samples_of,
     tints_of,
 )
-from studio_plugins.slf.incident import Arriving, Incident
+from studio_plugins.slf.incident import Incident
 from studio_plugins.slf.joint import decide
 from studio_plugins.slf.outcome import Canvas, finding_of, label_of, told
 from studio_plugins.slf.places import Places, places_of
@@ -192,9 +193,8 @@ class JointRun:
         shapes, own_shape = dressed.shapes(), dressed.own_shape(gloss)
         every = np.concatenate([shapes, own_shape[None]])
         for stroke, places in seen:
-            light = self._incident.at(scene, lit, places, job)
-            painting.rays += light.rays
-            sums = self._sums(dressed, every, light, places, job)
+            sums, rays = self._sums(dressed, every, stroke, places, scene, lit, job)
+            painting.rays += rays
             samples, offset = samples_of(stroke, places, sums, dressed, now)
             painting.offsets.setdefault(stroke.id, []).append((places.mark, offset))
             parts.append((stroke, samples, places))
@@ -205,9 +205,21 @@ class JointRun:
         count = sum(len(places) for _, _, places in parts)
         painting.take(Step(tuple(stroke for stroke, _, _ in parts), verdict, now, gloss, count))
 
-    def _sums(self, dressed: Dressed, shapes: Any, light: Arriving, places: Places, job: Job) -> F64:
+    def _sums(
+        self, dressed: Dressed, shapes: Any, stroke: Stroke, places: Places, scene: Scene, lit: Lit, job: Job
+    ) -> tuple[F64, int]:
+        """(L, N, T, 3) columns at a stroke's places, and the rays that this took."""
+        assert stroke.marks is not None
         brdf, pattern = dressed.resolved.brdf, self._incident.pattern.directions[0]
-        return sums_at(brdf.address, brdf.terms, shapes, light, places, pattern, self._services.workers, job)
+        model, workers = (brdf.address, brdf.terms, shapes), self._services.workers
+        eye = stroke.marks.eye[places.mark] - lit.surfaces.unrefined.mesh.origin
+        towards, strength, rays = self._incident.lamps(scene, lit, places, job)
+        sums = lamp_sums(*model, places, towards, strength, workers, job)
+        corners = Corners.of(lit, places, eye, workers)
+        light = self._incident.at(scene, lit, corners.places, job, straight=False)
+        if light.light.any():
+            sums += corners.between(sums_at(*model, light, corners.places, pattern, workers, job))
+        return sums, rays + light.rays
 
 
 SOLVER = Joint()
