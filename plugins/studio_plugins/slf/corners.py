@@ -42,7 +42,7 @@ class Corners:
     def of(cls, lit: Lit, places: Places, eye: F64, workers: Workers) -> Corners:
         """Of the faces that are met at places from where they are seen, eyes (N, 3) in the mesh's frame, else
         of the vertices that stand for them. Corners that face away have no weight; where there would be more
-        than places, each place has its nearest one alone.
+        than places, each place has its heaviest one alone.
         """
         mesh = lit.surfaces.unrefined.mesh
         towards = np.einsum("nji,nj->ni", places.axes, places.wo)
