@@ -30,6 +30,7 @@ from studio_plugins.slf.explaining import (
     Painting,
     Step,
     allowed_of,
+    exactness_of,
     meant_first,
     on_region,
     pooled_of,
@@ -199,9 +200,11 @@ class JointRun:
             painting.offsets.setdefault(stroke.id, []).append((places.mark, offset))
             parts.append((stroke, samples, places))
         pooled = pooled_of(parts)
-        allowed = allowed_of(dressed, [stroke for stroke, _, _ in parts])
-        tints = tints_of(pooled, dressed, now) if params.coloured and not dressed.white else ()
-        verdict = meant_first(decide(pooled, dressed, now, allowed, tints), dressed, group)
+        strokes = [stroke for stroke, _, _ in parts]
+        allowed = allowed_of(dressed, strokes)
+        tints = tints_of(pooled, dressed, now, strokes) if params.coloured else ()
+        verdict = decide(pooled, dressed, now, allowed, tints, exactness_of(strokes))
+        verdict = meant_first(verdict, dressed, group)
         count = sum(len(places) for _, _, places in parts)
         painting.take(Step(tuple(stroke for stroke, _, _ in parts), verdict, now, gloss, count))
 
