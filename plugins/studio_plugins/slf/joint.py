@@ -128,9 +128,8 @@ def decide(
             ]
         tried += [(change, extra, one) for one, extra in found]
     change, _, nearest = min(tried, key=lambda one: one[2].left)
-    noise = (
-        min(_scatter(samples, model, nearest.reflectance, Change.GLOSS not in change), nearest.left) / total
-    )
+    scatter = _scatter(samples, model, nearest.reflectance, Change.GLOSS not in change)
+    noise = min(scatter, nearest.left) / total
     floor = noise * min(PLACES / len(samples), 1) + exactness**2
     made = []
     for change, extra, one in tried:

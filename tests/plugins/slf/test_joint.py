@@ -35,6 +35,15 @@ def test_the_right_parameters_are_named_and_their_values_found(change, noise):
     assert np.mean(off) < 0.05
 
 
+def test_noise_of_many_places_hides_no_small_change():
+    """And makes none."""
+    small = reflectance(NOW.diffuse, NOW.specular, 10)
+    for seed in range(4):
+        for then, change in ((small, Change.GLOSS), (NOW, Change.NONE)):
+            samples = painted(np.random.default_rng(seed), NOW, then, 0.1, views=600)
+            assert decide(samples, MODEL, NOW).best.change == change
+
+
 def test_a_stroke_on_what_no_light_reaches_says_nothing():
     samples = painted(np.random.default_rng(0), NOW, CHANGES[Change.DIFFUSE])
     dark = dataclasses.replace(
