@@ -21,17 +21,17 @@ CHANGES = {
 }
 
 
-@pytest.mark.parametrize("noise", [0.0, 0.02, 0.1])
+@pytest.mark.parametrize("noise", [0.02, 0.1])
 @pytest.mark.parametrize("change", list(CHANGES))
 def test_the_right_parameters_are_named_and_their_values_found(change, noise):
     right, off = 0, []
-    for seed in range(30):
+    for seed in range(20):
         verdict = decide(painted(np.random.default_rng(seed), NOW, CHANGES[change], noise), MODEL, NOW)
         right += verdict.best.change == change
         if verdict.best.change == change:
             made, true = verdict.best.reflectance, CHANGES[change]
             off.append(np.abs(made.diffuse - true.diffuse).max() / true.diffuse.max())
-    assert right >= (28 if noise <= 0.02 else 26)
+    assert right >= (19 if noise <= 0.02 else 18)
     assert np.mean(off) < 0.05
 
 
