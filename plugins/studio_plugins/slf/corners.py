@@ -1,9 +1,9 @@
 """Columns at marks from the corners of the faces they lie on, as pictures have them.
 
-A picture has the light of the environment, and that between surfaces, from the vertices of a face; so have
-the columns: they are summed at each corner, in its frame and towards the eye, and brought to the marks that
-lie between. What the nearest vertex alone sees is wrong wherever shadows end between vertices, and where
-things lie in each other it may be the one that is hidden. Lamps and suns light every place by themselves.
+A picture has its light from the vertices of a face; so have the columns: they are summed at each corner, in
+its frame and towards the eye, and brought to the marks that lie between. What the nearest vertex alone sees
+is wrong wherever shadows end between vertices, and where things lie in each other it may be the one that is
+hidden.
 """
 
 from __future__ import annotations
@@ -13,8 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from studio_core.jit import call_address, kernel
-from studio_core.parallel import Checkpoints, Workers
+from studio_core.parallel import Workers
 from studio_core.scene.shading_mesh import NO_BACK
 from studio_core.scene.world_mesh import WorldMesh
 from studio_core.strokes.solution import Lit
@@ -85,51 +84,4 @@ def _seen(mesh: WorldMesh, vertex: I64, eye: F64) -> Places:
     return Places(position, axes, wo, vertex, owner, none, np.arange(len(vertex)))
 
 
-def lamp_sums(
-    address: int,
-    terms: int,
-    shapes: F32,
-    places: Places,
-    towards: F32,
-    strength: F32,
-    workers: Workers,
-    job: Checkpoints | None = None,
-) -> F64:
-    """(L, N, terms, 3) of a model's kernel with shapes (L, D): Σ strength · b_k · cosθ over samples of lamps.
-
-    towards, strength (N, C, 3) are those of `incident.Arriving`.
-    """
-    out = np.zeros((len(shapes), len(places), terms, 3))
-    if not strength.any():
-        return out
-    way = np.ascontiguousarray(np.einsum("nij,ncj->nic", places.axes, towards), np.float32)
-    light = strength * np.maximum(way[:, 2, :, None], 0)
-    given_shapes, wo = np.ascontiguousarray(shapes, np.float32), np.ascontiguousarray(places.wo, np.float32)
-
-    def body(start: int, stop: int) -> None:
-        add_lamps(address, terms, given_shapes, wo, way, light, out, start, stop)
-
-    workers.run(len(places), 16, body, job)
-    return out
-
-
-@kernel
-def add_lamps(
-    address: int, terms: int, shapes: F32, wo: F32, way: F32, light: F32, out: F64, start: int, stop: int
-) -> None:
-    """See `lamp_sums`; way (N, 3, C) in the places' frames, light (N, C, 3) with its cosine."""
-    count = light.shape[1]
-    wi, values = np.empty(3 * count, np.float32), np.empty(terms * count, np.float32)
-    for n in range(start, stop):
-        for axis in range(3):
-            wi[axis * count : (axis + 1) * count] = way[n, axis]
-        for level in range(len(shapes)):
-            call_address(address, shapes[level], wo[n], count, wi, values)
-            for term in range(terms):
-                for i in range(count):
-                    value = values[term * count + i]
-                    for channel in range(3):
-                        out[level, n, term, channel] += value * light[n, i, channel]
-
-
-__all__ = ["Corners", "lamp_sums"]
+__all__ = ["Corners"]

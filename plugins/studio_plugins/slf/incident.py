@@ -66,10 +66,8 @@ class Incident:
         self.pattern: Pattern = grid_pattern(SIDE)
         self.table = Transport(services.workers, self.pattern)
 
-    def at(
-        self, scene: Scene, lit: Lit, places: Places, job: Checkpoints | None = None, *, straight: bool = True
-    ) -> Arriving:
-        """Light at places, as it is now; not `straight`: without lamps and suns."""
+    def at(self, scene: Scene, lit: Lit, places: Places, job: Checkpoints | None = None) -> Arriving:
+        """Light at places, as it is now."""
         surfaces = lit.surfaces.unrefined
         mesh = surfaces.mesh
         vertices, row = np.unique(places.vertex, return_inverse=True)
@@ -98,8 +96,7 @@ class Incident:
 
             self._workers.run(len(axes), 16, body, None)
             light = np.where(open_[..., None], means, light)
-        none = np.zeros((len(places), 0, 3), np.float32)
-        towards, strength, rays = self.lamps(scene, lit, places, job) if straight else (none, none, 0)
+        towards, strength, rays = self._lamps(scene, lit, places, job)
         return Arriving(row, light, open_, axes, towards, strength, sky, done.rays + rays)
 
     def _sky(self, scene: Scene, lighting: Lighting) -> F32:
@@ -111,8 +108,7 @@ class Incident:
             return np.zeros((0, 3), np.float32)
         return np.asarray(tree.radiance * np.asarray(node.gain(), np.float32), np.float32)
 
-    def lamps(self, scene: Scene, lit: Lit, places: Places, job: Checkpoints | None) -> tuple[F32, F32, int]:
-        """(N, C, 3) where places see lamps and suns, and how strong they are there; and rays traced."""
+    def _lamps(self, scene: Scene, lit: Lit, places: Places, job: Checkpoints | None) -> tuple[F32, F32, int]:
         lighting, mesh = lit.lighting, lit.surfaces.unrefined.mesh
         parts = [lamp_samples(lamp, LAMP_SAMPLES, 1, 1) for lamp in lighting.lamps]
         if lighting.environment is not None and lighting.sun is not None:

@@ -24,7 +24,7 @@ from studio_core.strokes.solution import Lit, Reason, Solution
 from studio_core.strokes.solved import Solved
 from studio_core.strokes.stroke import FIXATE, Stroke
 from studio_plugins.slf.columns import sums_at
-from studio_plugins.slf.corners import Corners, lamp_sums
+from studio_plugins.slf.corners import Corners
 from studio_plugins.slf.dressed import Dressed
 from studio_plugins.slf.explaining import (
     Painting,
@@ -214,15 +214,12 @@ class JointRun:
         """(L, N, T, 3) columns at a stroke's places, and the rays that this took."""
         assert stroke.marks is not None
         brdf, pattern = dressed.resolved.brdf, self._incident.pattern.directions[0]
-        model, workers = (brdf.address, brdf.terms, shapes), self._services.workers
+        workers = self._services.workers
         eye = stroke.marks.eye[places.mark] - lit.surfaces.unrefined.mesh.origin
-        towards, strength, rays = self._incident.lamps(scene, lit, places, job)
-        sums = lamp_sums(*model, places, towards, strength, workers, job)
         corners = Corners.of(lit, places, eye, workers)
-        light = self._incident.at(scene, lit, corners.places, job, straight=False)
-        if light.light.any():
-            sums += corners.between(sums_at(*model, light, corners.places, pattern, workers, job))
-        return sums, rays + light.rays
+        light = self._incident.at(scene, lit, corners.places, job)
+        sums = sums_at(brdf.address, brdf.terms, shapes, light, corners.places, pattern, workers, job)
+        return corners.between(sums), light.rays
 
 
 SOLVER = Joint()

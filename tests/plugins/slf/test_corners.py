@@ -1,4 +1,4 @@
-"""Columns from corners of faces: which they are and how they are weighed; lamps at the places themselves."""
+"""Columns from corners of faces: which they are and how they are weighed."""
 
 from __future__ import annotations
 
@@ -6,9 +6,8 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from studio_core.brdfs.calls import evaluate_at
 from studio_core.scene.shading_mesh import NO_BACK
-from studio_plugins.slf.corners import Corners, lamp_sums
+from studio_plugins.slf.corners import Corners
 from studio_plugins.slf.places import Places
 
 SQUARE = np.array([[0, 0, 0], [2, 0, 0], [2, 0, 2], [0, 0, 2]], np.float32)
@@ -96,23 +95,3 @@ def test_where_no_face_is_met_the_vertex_stands_for_the_place(workers):
     made = Corners.of(lit(met=False), given, np.tile(EYE, (5, 1)), workers)
     assert made.places.vertex.tolist() == [3]
     np.testing.assert_allclose(made.weight.sum(axis=1), 1)
-
-
-def test_lamps_are_plain_sums_at_places(host, workers):
-    rng = np.random.default_rng(2)
-    given = places(rng, 3)
-    towards = rng.normal(size=(3, 6, 3)).astype(np.float32)
-    towards /= np.linalg.norm(towards, axis=2, keepdims=True)
-    strength = rng.uniform(0, 2, (3, 6, 3)).astype(np.float32)
-    model = host.brdf("specgloss")
-    values = {"diffuse": (0.5,) * 3, "specular": (0.2,) * 3, "keep_energy": True}
-    shapes = np.stack([model.shape({**values, "roughness": r}) for r in (0.2, 0.6)])
-    made = lamp_sums(model.address, model.terms, shapes, given, towards, strength, workers)
-    for level, n in np.ndindex(2, 3):
-        wi = towards[n] @ given.axes[n].T
-        b = evaluate_at(model.address, model.terms, shapes[level], given.wo[n], wi)
-        plain = np.einsum("it,ic,i->tc", b, strength[n], np.maximum(wi[:, 2], 0))
-        np.testing.assert_allclose(made[level, n], plain, rtol=1e-4, atol=1e-6)
-    dark = lamp_sums(model.address, model.terms, shapes, given, towards, 0 * strength, workers)
-    assert dark.shape == made.shape
-    assert not dark.any()
