@@ -25,6 +25,8 @@ F64 = npt.NDArray[np.float64]
 I64 = npt.NDArray[np.int64]
 ABOVE = 1e-3
 """Metres above a mark from which its face is looked for."""
+FEW = 200
+"""So many corners are always summed, and else as many as there are places."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,10 +40,10 @@ class Corners:
     weight: F64
 
     @classmethod
-    def of(cls, lit: Lit, places: Places, eye: F64, workers: Workers) -> Corners:
+    def of(cls, lit: Lit, places: Places, eye: F64, workers: Workers, few: int = FEW) -> Corners:
         """Of the faces that are met at places from where they are seen, eyes (N, 3) in the mesh's frame, else
         of the vertices that stand for them. Corners that face away have no weight; where there would be more
-        than places, each place has its heaviest one alone.
+        than places and more than `few`, each place has its heaviest one alone.
         """
         mesh = lit.surfaces.unrefined.mesh
         towards = np.einsum("nji,nj->ni", places.axes, places.wo)
@@ -59,7 +61,7 @@ class Corners:
         weight /= total[:, None]
         eyes, seen_from = np.unique(eye, axis=0, return_inverse=True)
         names, which = np.unique(corner * len(eyes) + seen_from.reshape(-1, 1), return_inverse=True)
-        if len(names) > len(places):
+        if len(names) > max(len(places), few):
             most = weight.argmax(axis=1)[:, None]
             corner, weight = np.take_along_axis(corner, most, axis=1), np.ones((len(places), 1))
             names, which = np.unique(corner * len(eyes) + seen_from.reshape(-1, 1), return_inverse=True)

@@ -80,9 +80,9 @@ def test_eyes_have_corners_of_their_own(workers):
     assert len(Corners.of(lit(), given, eyes, workers).places) == 8
 
 
-def test_few_places_have_their_heaviest_corner_alone(workers):
+def test_where_corners_are_many_each_place_has_its_heaviest_alone(workers):
     given = places(np.random.default_rng(0), 2)
-    made = Corners.of(lit(), given, np.tile(EYE, (2, 1)), workers)
+    made = Corners.of(lit(), given, np.tile(EYE, (2, 1)), workers, few=2)
     assert made.which.shape == (2, 1)
     assert (made.weight == 1).all()
     for (x, _, z), which in zip(given.position / 2, made.which, strict=True):
