@@ -110,8 +110,7 @@ def _trust(offset: F64, shown: F64, before: F64) -> F64:
 
 def _painted(marks: Marks) -> npt.NDArray[np.bool_]:
     """(N,) which do not want what is shown."""
-    made: npt.NDArray[np.bool_] = np.not_equal(marks.wanted, marks.shown).any(axis=1)
-    return made
+    return np.asarray(np.not_equal(marks.wanted, marks.shown).any(axis=1), np.bool_)
 
 
 def pooled_of(parts: Sequence[tuple[Stroke, Samples, Places]]) -> Samples:
