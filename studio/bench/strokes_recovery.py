@@ -4,7 +4,8 @@ Cases are SOLVER/LIGHT/STROKE/NOISE/PARAMETER: what is painted is the picture af
 mean colour (`flat`), or that picture with its brightest 30 % cut off (`clipped`); each mark's wanted light is
 then wrong by a normal NOISE, relative. `right_parameter` is the share of trials in which the first reason
 names what was changed, with the deviation of such a share as spread; `value_error` the median relative error
-of the values that were changed, where it does.
+of the values that were changed, where it does; `offered` the share in which it is among the reasons that are
+shown: where two changes make the same light, no picture tells which was meant.
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ from studio_core.shading.job import Job
 from studio_core.strokes.brush import Brush
 from studio_core.strokes.painting import marks_of, stroke_of
 from studio_core.strokes.session import KIND
-from studio_core.strokes.solution import Solution
+from studio_core.strokes.solution import Reason, Solution
 from studio_core.strokes.stroke import REPLACE, Stroke
 
 F32 = npt.NDArray[np.float32]
@@ -53,22 +54,25 @@ WORDS: Mapping[str, frozenset[str]] = {
 
 @dataclass
 class Tally:
-    """Outcomes of one case: whether each was right, and errors of the values where it was."""
+    """Outcomes of one case: whether each was right, whether that was offered, and errors of right values."""
 
     right: list[bool] = field(default_factory=list)
+    offered: list[bool] = field(default_factory=list)
     errors: list[float] = field(default_factory=list)
 
-    def add(self, outcome: tuple[bool, float]) -> None:
+    def add(self, outcome: tuple[bool, float], among: bool) -> None:
         """One trial's."""
         self.right.append(outcome[0])
+        self.offered.append(among)
         if outcome[0] and math.isfinite(outcome[1]):
             self.errors.append(outcome[1])
 
     def tell(self, report: Report, case: str) -> None:
         """The rows of the case."""
-        share = float(np.mean(self.right))
-        spread = math.sqrt(share * (1 - share) / len(self.right))
-        report.add(case, "right_parameter", share, "1", spread)
+        for metric, outcomes in (("right_parameter", self.right), ("offered", self.offered)):
+            share = float(np.mean(outcomes))
+            spread = math.sqrt(share * (1 - share) / len(outcomes))
+            report.add(case, metric, share, "1", spread)
         if self.errors:
             low, middle, high = np.percentile(self.errors, [25, 50, 75])
             report.add(case, "value_error", float(middle), "1", float(high - low) / 2)
@@ -118,7 +122,7 @@ def take(
         scene = Add(tuple(strokes))(one.scene)
         ids = [stroke.id for stroke in strokes]
         solution = runs[name].solve(scene, ids, one.lit, solvers[name].Params(), Job("Trial"))
-        tallies[case].add(judged(solution, one, parameter))
+        tallies[case].add(judged(solution, one, parameter), offered(solution, one, parameter))
 
 
 def painted(one: Trial, kind: str, noise: float, parameter: str, number: int) -> list[Stroke]:
@@ -163,16 +167,28 @@ def _mask(own: npt.NDArray[np.bool_], rng: np.random.Generator) -> F32:
 
 def judged(solution: Solution, one: Trial, parameter: str) -> tuple[bool, float]:
     """Whether what was changed is named, and how far off its values are (NaN where it is not)."""
-    place = (one.node, one.slot)
-    finding = next((found for found in solution.findings if (found.node, found.slot) == place), None)
+    reasons = reasons_of(solution, one)
     values, roles = one.truth[parameter]
-    if finding is None or not finding.reasons:
+    if not reasons:
         return not roles, math.nan
-    best = finding.reasons[0]
+    best = reasons[0]
     if WORDS[best.meaning] != roles:
         return False, math.nan
     errors = [relative(best.values[NAMES[role]], values[NAMES[role]]) for role in sorted(roles)]
     return True, max(errors, default=math.nan)
+
+
+def offered(solution: Solution, one: Trial, parameter: str) -> bool:
+    """Whether what was changed is among the reasons."""
+    named = [WORDS[reason.meaning] for reason in reasons_of(solution, one)] or [frozenset()]
+    return one.truth[parameter][1] in named
+
+
+def reasons_of(solution: Solution, one: Trial) -> tuple[Reason, ...]:
+    """Those for the object and slot that were painted."""
+    place = (one.node, one.slot)
+    found = (finding.reasons for finding in solution.findings if (finding.node, finding.slot) == place)
+    return next(found, ())
 
 
 def relative(found: Value, true: Value) -> float:

@@ -11,7 +11,7 @@ from scenes import little_scene
 
 from studio.bench import strokes, strokes_recovery, strokes_trials
 from studio.bench.harness import Report
-from studio.bench.strokes_recovery import Tally, case_name, judged, painted, relative, wish
+from studio.bench.strokes_recovery import Tally, case_name, judged, offered, painted, relative, wish
 from studio.bench.strokes_trials import (
     MATERIAL,
     NAMES,
@@ -119,15 +119,28 @@ def test_outcomes_are_judged_by_the_first_reason(one):
     assert judged(solution(one, "", truth), one, "none")[0] is True
     assert judged(Solution(Compound("", ())), one, "none")[0] is True
     assert judged(Solution(Compound("", ())), one, "gloss")[0] is False
+    both = (
+        solution(one, "shine", truth).findings[0].reasons + solution(one, "colour", truth).findings[0].reasons
+    )
+    told = Solution(Compound("", ()), (Finding(one.node, one.slot, (), both),))
+    assert judged(told, one, "diffuse")[0] is False
+    assert [offered(told, one, name) for name in ("diffuse", "specular", "gloss", "none")] == [
+        True,
+        True,
+        False,
+        False,
+    ]
+    assert offered(Solution(Compound("", ())), one, "none")
 
 
 def test_rows_are_shares_and_medians():
     tally, report = Tally(), Report("strokes", True)
     for outcome in ((True, 0.1), (True, 0.3), (True, 0.2), (False, math.nan)):
-        tally.add(outcome)
+        tally.add(outcome, True)
     tally.tell(report, "case")
     told = {row.metric: row for row in report.rows}
     assert told["right_parameter"].value == 0.75
+    assert told["offered"].value == 1
     assert told["right_parameter"].spread == pytest.approx(math.sqrt(0.75 * 0.25 / 4))
     assert told["value_error"].value == pytest.approx(0.2)
 

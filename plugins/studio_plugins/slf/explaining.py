@@ -11,10 +11,11 @@ import numpy.typing as npt
 
 from studio_core.contract import Services
 from studio_core.scene.nodes import Material, NodeId
+from studio_core.strokes.marks import Marks
 from studio_core.strokes.paintable import paintable
 from studio_core.strokes.stroke import AUTOMATIC, FIXATE, Stroke
 from studio_plugins.slf.dressed import Dressed
-from studio_plugins.slf.joint import SINGLE, Change, Verdict
+from studio_plugins.slf.joint import NOISE, SINGLE, Change, Verdict
 from studio_plugins.slf.places import Places
 from studio_plugins.slf.regions import Region
 from studio_plugins.slf.samples import F64, Reflectance, Samples
@@ -32,6 +33,8 @@ WORDS: Mapping[Change, str] = {
 MEANT = {word: change for change, word in WORDS.items()}
 STRANGE = 0.15
 """Relative error of a place's light as it is, from which on it says little of how it would change."""
+NOISE_OF_ONE_LIGHT = 0.05
+"""As `joint.NOISE`, of one flat colour."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,7 +94,9 @@ def samples_of(
     before = np.einsum("ntc,tc->nc", sums[-1], coefficients)
     known = np.isfinite(marks.offset).all(axis=1, keepdims=True)
     offset = np.where(known, marks.offset, shown - before)
-    weight = marks.weight.astype(np.float64) * stroke.weight * _trust(offset, shown, before)
+    weight = marks.weight.astype(np.float64) * stroke.weight
+    one_light = stroke.flat & _painted(marks)  # as wanted in the mean over all of them, known well or not
+    weight = weight * np.where(one_light, 1, _trust(offset, shown, before))
     return Samples(wanted - offset, before, sums[:-1], sums[-1], weight), offset
 
 
@@ -103,6 +108,11 @@ def _trust(offset: F64, shown: F64, before: F64) -> F64:
     return np.asarray(1 / (1 + (relative / STRANGE) ** 2) ** 2)
 
 
+def _painted(marks: Marks) -> npt.NDArray[np.bool_]:
+    """(N,) which do not want what is shown."""
+    return np.asarray(np.not_equal(marks.wanted, marks.shown).any(axis=1), np.bool_)
+
+
 def pooled_of(parts: Sequence[tuple[Stroke, Samples, Places]]) -> Samples:
     """All samples; of a stroke in one flat colour its mean, and what lies beside it as it is."""
     made: Samples | None = None
@@ -110,20 +120,31 @@ def pooled_of(parts: Sequence[tuple[Stroke, Samples, Places]]) -> Samples:
         one = samples
         if stroke.flat and stroke.tool != FIXATE and stroke.marks is not None:
             marks = stroke.marks.some(places.mark)
-            painted = np.not_equal(marks.wanted, marks.shown).any(axis=1)
+            painted = _painted(marks)
             one = samples.some(np.flatnonzero(painted)).mean() + samples.some(np.flatnonzero(~painted))
         made = one if made is None else made + one
     assert made is not None
     return made
 
 
+def one_light(strokes: Sequence[Stroke]) -> bool:
+    """Whether all of them are of one flat colour each."""
+    painted = [stroke for stroke in strokes if stroke.tool != FIXATE]
+    return bool(painted) and all(stroke.flat for stroke in painted)
+
+
 def allowed_of(dressed: Dressed, strokes: Sequence[Stroke]) -> tuple[Change, ...]:
     """What may change: single changes for flat strokes and what somebody chose, else all that there is."""
-    painted = [stroke for stroke in strokes if stroke.tool != FIXATE]
-    if painted and all(stroke.flat for stroke in painted):
-        some = (*SINGLE, *(MEANT[stroke.meaning] for stroke in painted if stroke.meaning != AUTOMATIC))
+    if one_light(strokes):
+        chosen = (stroke.meaning for stroke in strokes if stroke.tool != FIXATE)
+        some = (*SINGLE, *(MEANT[meaning] for meaning in chosen if meaning != AUTOMATIC))
         return tuple(change for change in dict.fromkeys(some) if change & dressed.can == change)
     return dressed.allowed
+
+
+def exactness_of(strokes: Sequence[Stroke]) -> float:
+    """The relative error with which light is meant."""
+    return NOISE_OF_ONE_LIGHT if one_light(strokes) else NOISE
 
 
 def meant_first(verdict: Verdict, dressed: Dressed, strokes: Sequence[Stroke]) -> Verdict:
@@ -137,8 +158,15 @@ def meant_first(verdict: Verdict, dressed: Dressed, strokes: Sequence[Stroke]) -
     return verdict
 
 
-def tints_of(samples: Samples, dressed: Dressed, now: Reflectance) -> tuple[F64, ...]:
-    """White, and the colour in which the shine would have what was painted."""
+def tints_of(
+    samples: Samples, dressed: Dressed, now: Reflectance, strokes: Sequence[Stroke]
+) -> tuple[F64, ...]:
+    """White, and the colour in which the shine would have what was painted.
+
+    None for one flat colour beside a matte part, which could have it as well.
+    """
+    if dressed.white or (one_light(strokes) and Change.DIFFUSE in dressed.can):
+        return ()
     more = samples.wanted - samples.before
     full = Reflectance(now.diffuse, np.ones(3), now.level)
     none = Reflectance(now.diffuse, np.zeros(3), now.level)
@@ -155,6 +183,7 @@ __all__ = [
     "Painting",
     "Step",
     "allowed_of",
+    "exactness_of",
     "meant_first",
     "on_region",
     "pooled_of",

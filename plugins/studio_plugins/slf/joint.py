@@ -4,10 +4,11 @@ A highlight that is painted on ten places says one thing about the material, not
 on one material are pooled; every set of parameters that may have changed is fitted as well as it can be, and
 pays for each number it changes (the Bayesian information criterion over n_eff independent places):
 
-    score = n_eff · ln(RSS + 0.05²) + k · ln(n_eff),
+    score = n_eff · ln(RSS − σ² + σ² n_eff / n + 0.03²) + k · ln(n_eff),
 
 RSS the mean relative squared difference that is left, k = 0 for no change, 1 for the amount of shine or the
-gloss, 3 for the matte colour, and sums of these.
+gloss, 3 for the matte colour, and sums of these. σ² of it is noise of single places, which tells nothing of
+any of them, and is less in the mean of the n / n_eff places that say the same.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ from studio_plugins.slf.grams import best as best_of
 from studio_plugins.slf.samples import F64, Model, Reflectance, Samples
 
 PLACES = 30.0  # n_eff
-NOISE = 0.05
+NOISE = 0.03
 """What is painted is meant no more exactly than that."""
 CLOSE = 2.0 * math.log(PLACES)
 """Explanations whose scores are nearer than that to the best one's are shown beside it."""
@@ -97,6 +98,7 @@ def decide(
     now: Reflectance,
     allowed: Sequence[Change] = EVERY,
     tints: Sequence[F64] = (),
+    exactness: float = NOISE,
 ) -> Verdict:
     """What of `now` changes such that the samples come out; places with numbers that are none are left out.
 
@@ -118,15 +120,21 @@ def decide(
     offered += [(t / max(t.max(), 1e-9), 2) for t in tints if _apart(t, now.tint)]
     changing = [(Shines.start(model, now, tint), extra) for tint, extra in offered]
     staying = [(Shines.start(model, now, None), 0)]
-    made = []
+    tried: list[tuple[Change, int, Found]] = []
     for change in allowed:
         grams, diffuse = others if Change.GLOSS in change else here, Change.DIFFUSE in change
         for shines, extra in changing if Change.SPECULAR in change else staying:
-            one = _finer(rungs, grams, model, now, diffuse, shines)
-            left = one.left / total
-            score = PLACES * math.log(left + NOISE**2) + (change.cost + extra) * math.log(PLACES)
-            explained = 1 - left / before if before > 0 else 0.0
-            made.append(Explanation(change, one.reflectance, left, score, explained))
+            tried.append((change, extra, _finer(rungs, grams, model, now, diffuse, shines)))
+    change, _, nearest = min(tried, key=lambda one: one[2].left)
+    scatter = _scatter(samples, model, nearest.reflectance, Change.GLOSS not in change)
+    noise = min(scatter, nearest.left) / total
+    floor = noise * min(PLACES / len(samples), 1) + exactness**2
+    made = []
+    for change, extra, one in tried:
+        left = one.left / total
+        score = PLACES * math.log(left - noise + floor) + (change.cost + extra) * math.log(PLACES)
+        explained = 1 - left / before if before > 0 else 0.0
+        made.append(Explanation(change, one.reflectance, left, score, explained))
     best: dict[Change, Explanation] = {}
     for explanation in made:
         if explanation.change not in best or explanation.score < best[explanation.change].score:
@@ -147,6 +155,19 @@ def _finer(
         if again.left < found.left:
             return again
     return found
+
+
+def _scatter(samples: Samples, model: Model, found: Reflectance, own: bool) -> float:
+    """Of the weighted squared error that is left, what differs at random from each place to the next.
+
+    Places follow each other along rows of the stroke, so half the mean squared difference of successive ones
+    is the variance of what they do not share (von Neumann 1941, "Distribution of the Ratio of the Mean Square
+    Successive Difference to the Variance").
+    """
+    error = samples.made(model, found, own) - samples.wanted
+    each = np.sqrt(samples.importance / samples.weight[:, None]) * error
+    weight = np.minimum(samples.weight[1:], samples.weight[:-1])
+    return float((weight[:, None] * (each[1:] - each[:-1]) ** 2).sum() / 2)
 
 
 def _apart(tint: F64, own: F64) -> bool:

@@ -24,18 +24,20 @@ from studio_core.strokes.solution import Lit, Reason, Solution
 from studio_core.strokes.solved import Solved
 from studio_core.strokes.stroke import FIXATE, Stroke
 from studio_plugins.slf.columns import sums_at
+from studio_plugins.slf.corners import Corners
 from studio_plugins.slf.dressed import Dressed
 from studio_plugins.slf.explaining import (
     Painting,
     Step,
     allowed_of,
+    exactness_of,
     meant_first,
     on_region,
     pooled_of,
     samples_of,
     tints_of,
 )
-from studio_plugins.slf.incident import Arriving, Incident
+from studio_plugins.slf.incident import Incident
 from studio_plugins.slf.joint import decide
 from studio_plugins.slf.outcome import Canvas, finding_of, label_of, told
 from studio_plugins.slf.places import Places, places_of
@@ -201,22 +203,31 @@ class JointRun:
         shapes, own_shape = dressed.shapes(), dressed.own_shape(gloss)
         every = np.concatenate([shapes, own_shape[None]])
         for stroke, places in seen:
-            light = self._incident.at(scene, lit, places, job)
-            painting.rays += light.rays
-            sums = self._sums(dressed, every, light, places, job)
+            sums, rays = self._sums(dressed, every, stroke, places, scene, lit, job)
+            painting.rays += rays
             samples, offset = samples_of(stroke, places, sums, dressed, now)
             painting.offsets.setdefault(stroke.id, []).append((places.mark, offset))
             parts.append((stroke, samples, places))
         pooled = pooled_of(parts)
-        allowed = allowed_of(dressed, [stroke for stroke, _, _ in parts])
-        tints = tints_of(pooled, dressed, now) if params.coloured and not dressed.white else ()
-        verdict = meant_first(decide(pooled, dressed, now, allowed, tints), dressed, group)
+        strokes = [stroke for stroke, _, _ in parts]
+        allowed = allowed_of(dressed, strokes)
+        tints = tints_of(pooled, dressed, now, strokes) if params.coloured else ()
+        verdict = decide(pooled, dressed, now, allowed, tints, exactness_of(strokes))
+        verdict = meant_first(verdict, dressed, group)
         count = sum(len(places) for _, _, places in parts)
         painting.take(Step(tuple(stroke for stroke, _, _ in parts), verdict, now, gloss, count))
 
-    def _sums(self, dressed: Dressed, shapes: Any, light: Arriving, places: Places, job: Job) -> F64:
-        brdf = dressed.resolved.brdf
-        return sums_at(brdf.address, brdf.terms, shapes, light, places, self._services.workers, job)
+    def _sums(
+        self, dressed: Dressed, shapes: Any, stroke: Stroke, places: Places, scene: Scene, lit: Lit, job: Job
+    ) -> tuple[F64, int]:
+        """(L, N, T, 3) columns at a stroke's places, and the rays that this took."""
+        assert stroke.marks is not None
+        brdf, workers = dressed.resolved.brdf, self._services.workers
+        eye = stroke.marks.eye[places.mark] - lit.surfaces.unrefined.mesh.origin
+        corners = Corners.of(lit, places, eye, workers)
+        light = self._incident.at(scene, lit, corners.places, job)
+        sums = sums_at(brdf.address, brdf.terms, shapes, light, corners.places, workers, job)
+        return corners.between(sums), light.rays
 
 
 SOLVER = Joint()

@@ -21,18 +21,27 @@ CHANGES = {
 }
 
 
-@pytest.mark.parametrize("noise", [0.0, 0.02, 0.1])
+@pytest.mark.parametrize("noise", [0.02, 0.1])
 @pytest.mark.parametrize("change", list(CHANGES))
 def test_the_right_parameters_are_named_and_their_values_found(change, noise):
     right, off = 0, []
-    for seed in range(30):
+    for seed in range(20):
         verdict = decide(painted(np.random.default_rng(seed), NOW, CHANGES[change], noise), MODEL, NOW)
         right += verdict.best.change == change
         if verdict.best.change == change:
             made, true = verdict.best.reflectance, CHANGES[change]
             off.append(np.abs(made.diffuse - true.diffuse).max() / true.diffuse.max())
-    assert right >= (28 if noise <= 0.02 else 26)
+    assert right >= (19 if noise <= 0.02 else 18)
     assert np.mean(off) < 0.05
+
+
+def test_noise_of_many_places_hides_no_small_change():
+    """And makes none."""
+    small = reflectance(NOW.diffuse, NOW.specular, 10)
+    for seed in range(4):
+        for then, change in ((small, Change.GLOSS), (NOW, Change.NONE)):
+            samples = painted(np.random.default_rng(seed), NOW, then, 0.1, views=600)
+            assert decide(samples, MODEL, NOW).best.change == change
 
 
 def test_a_stroke_on_what_no_light_reaches_says_nothing():
