@@ -30,6 +30,9 @@ plugin = Plugin(
         "backend": {"slf": "studio_plugins.slf.backend:BACKEND"},
         "solver": {
             "joint": "studio_plugins.slf.solver:SOLVER",
+            "mixed": "studio_plugins.slf.by_element:MIXED",
+            "l0": "studio_plugins.slf.by_element:SPARSE",
+            "l2": "studio_plugins.slf.by_element:FULL",
         },
     },
 )

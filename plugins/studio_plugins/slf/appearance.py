@@ -41,11 +41,16 @@ class Appearance:
         ends = np.append(shapes.offset, len(shapes.data))[1:]
         for row in range(len(made)):
             shape = shapes.data[shapes.offset[row] : ends[row]]
-            key = (int(shapes.address[row]), int(shapes.terms[row]), shape.tobytes())
-            if key not in self._known:
-                self._known[key] = _fitted(*key[:2], np.ascontiguousarray(shape))
-            made[row, : key[1]] = self._known[key]
+            terms = int(shapes.terms[row])
+            made[row, :terms] = self.shape(int(shapes.address[row]), terms, shape)
         return made
+
+    def shape(self, address: int, terms: int, shape: F32) -> F64:
+        """(terms, 3) of one shape (D,), as in `rows`."""
+        key = (address, terms, shape.tobytes())
+        if key not in self._known:
+            self._known[key] = _fitted(address, terms, np.ascontiguousarray(shape))
+        return self._known[key]
 
     def of(self, shapes: Shapes, row: I64, coefficients: F32) -> Reflectances:
         """Of E places: row (E,) of the shapes, −1 none; coefficients (E, T, 3)."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -20,13 +20,14 @@ from studio_core.strokes.paintable import paintable
 from studio_core.strokes.solution import Finding, Reason
 from studio_core.strokes.solved import Solved
 from studio_core.strokes.stroke import FIXATE, Stroke
-from studio_plugins.slf.explaining import WORDS, Painting
-from studio_plugins.slf.field import Decided, Field, Layer
+from studio_plugins.slf.elementwise import ElementStep
+from studio_plugins.slf.explaining import WORDS, Painting, Step
+from studio_plugins.slf.field import Decided, Field, Layer, Varied
 from studio_plugins.slf.joint import SINGLE, Explanation
 from studio_plugins.slf.regions import Region
 from studio_plugins.slf.samples import F64
 from studio_plugins.slf.similarity import Reach
-from studio_plugins.slf.spots import SLOTS
+from studio_plugins.slf.spots import SLOTS, Spots
 from studio_plugins.slf.spread import Spread
 
 TOLD = 4
@@ -63,10 +64,8 @@ class Canvas:
             if painting.changes or instead
         }
         scene = self.scene.with_materials(*materials.values())
-        field = Field(
-            [layer for region in self.found for layer in self._layers(scene, region, instead.get(region))]
-        )
-        made = self.spread(scene, self.surfaces, field) if field.layers else {}
+        field = self._field(scene, instead)
+        made = self.spread(scene, self.surfaces, field) if field.layers or field.varied else {}
         others = {node for stroke in scene.of(Stroke) if not stroke.hidden for node in stroke.objects}
         paints: dict[NodeId, Paint | None] = dict.fromkeys(self.whose)
         for node, paint in made.items():
@@ -97,20 +96,36 @@ class Canvas:
         steps = [step for painting in self.found.values() for step in painting.steps]
         return [*{stroke.id: stroke for step in steps for stroke in step.strokes}.values()]
 
-    def _layers(self, scene: Scene, region: Region, last: Explanation | None) -> Iterator[Layer]:
-        painting = self.found[region]
+    def _field(self, scene: Scene, instead: Mapping[Region, Explanation]) -> Field:
+        layers: list[Layer] = []
+        varied: list[Varied] = []
+        for region, painting in self.found.items():
+            for step in painting.steps:
+                last = instead.get(region) if step is painting.steps[-1] else None
+                marks = self._marks(scene, region, step)
+                if isinstance(step, ElementStep):
+                    changes = step.answer(last or step.verdict.best)
+                    if changes and marks:
+                        spots = self.spread.spots(scene, self.surfaces).some(step.vertex)
+                        varied.append(Varied(spots, changes, np.ones(len(spots), np.float32), marks))
+                    continue
+                one = last or step.verdict.best
+                changed = painting.dressed.changes(step.now, step.gloss, one.reflectance, one.change)
+                if changed and marks:
+                    layers.append([Decided(own, reach, changed) for own, reach in marks])
+        return Field(layers, varied)
+
+    def _marks(self, scene: Scene, region: Region, step: Step) -> list[tuple[Spots, Reach]]:
+        """Where a step's strokes lie on a region, and how far each reaches."""
         part = self.surfaces.unrefined.mesh.index_of(region.node) * SLOTS + region.slot
-        for step in painting.steps:
-            one = step.verdict.best if last is None or step is not painting.steps[-1] else last
-            changes = painting.dressed.changes(step.now, step.gloss, one.reflectance, one.change)
-            layer = []
-            for stroke in step.strokes if changes else ():
+        made = []
+        for stroke in step.strokes:
+            if stroke.tool != FIXATE:
                 marks = self.spread.marks(scene, self.surfaces, stroke)
                 own = marks.some(marks.part == part)
-                if stroke.tool != FIXATE and len(own):
-                    layer.append(Decided(own, Reach.of(stroke), changes))
-            if layer:
-                yield layer
+                if len(own):
+                    made.append((own, Reach.of(stroke)))
+        return made
 
 
 def _with_offsets(table: Any, offsets: Sequence[tuple[npt.NDArray[np.int64], F64]]) -> Any:

@@ -27,6 +27,7 @@ KEPT, DIFFUSE, SPECULAR, BOTH = range(4)
 PIVOT = 1e-6
 """Columns whose angle has a smaller squared sine are one column."""
 TINY = 1e-300
+ANYTHING = (True, True, True)
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,8 +123,13 @@ def _nearest(made: F64, systems: Systems) -> F64:
     return made
 
 
-def choose(systems: Systems, solver: Solver, literal: bool = False) -> Chosen:
-    """Equation 4 over a solver's candidates: `l0` one parameter, `l2` all of them, `mixed` any by weights."""
+def choose(
+    systems: Systems, solver: Solver, literal: bool = False, may: tuple[bool, bool, bool] = ANYTHING
+) -> Chosen:
+    """Equation 4 over a solver's candidates: `l0` one parameter, `l2` all of them, `mixed` any by weights.
+
+    Of the matte part, the shine and the gloss only what `may` change does; `l2` changes all of that.
+    """
     count, levels = systems.c22.shape
     channels, elements = systems.channels, len(systems.c22) // systems.channels
     arrays = (systems.c11, systems.d1, systems.bb, systems.now, systems.c12, systems.c22, systems.d2)
@@ -145,11 +151,13 @@ def choose(systems: Systems, solver: Solver, literal: bool = False) -> Chosen:
     own = np.arange(levels) == clean.level[:, None]
     changed = np.array([0, 1, 1, 2]) + np.where(own, 0, 1)[..., None]
     allowed = {"l0": changed <= 1, "l2": changed >= 2, "mixed": changed >= 0}[solver]
+    matte, shine, gloss = may
     if solver == "l2":
         allowed = np.zeros_like(allowed)
-        allowed[:, :, BOTH] = True
+        allowed[:, :, matte * DIFFUSE + shine * SPECULAR] = True
     if solver == "l0":
         allowed = allowed & ~((changed == 0) & (np.arange(4) == KEPT))  # as printed: one always changes
+    allowed = allowed & np.array([True, matte, shine, matte and shine]) & (own | gloss)[..., None]
     weight = np.asarray(WEIGHTS)[np.maximum(changed, 1)] if solver == "mixed" else np.ones(changed.shape)
     rated = np.where(allowed, cost * weight, np.inf).reshape(elements, -1)
     best = np.argmin(rated, axis=1)
