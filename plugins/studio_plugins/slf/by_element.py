@@ -23,7 +23,6 @@ from studio_core.scene.nodes import NodeId, Scene
 from studio_core.shading.job import Job
 from studio_core.strokes.solution import Lit, Solution
 from studio_core.strokes.stroke import AUTOMATIC, FIXATE, Stroke
-from studio_plugins.slf.appearance import Appearance
 from studio_plugins.slf.elementwise import ElementStep, Question, verdict_of
 from studio_plugins.slf.explaining import MEANT, Painting
 from studio_plugins.slf.field import Field, Varied
@@ -49,7 +48,7 @@ class Params:
     """Parameters of the solvers."""
 
     strength: float = param(
-        1000.0, "Strength", "How many other directions a painted one counts as (σ_m)", low=0.0, high=1e9,
+        1e5, "Strength", "How many other directions a painted one counts as (σ_m)", low=0.0, high=1e9,
         advanced=True,
     )  # fmt: skip
     literal: bool = param(
@@ -79,7 +78,6 @@ class ElementRun(JointRun):
         super().__init__(services)
         self._kind: Solver = kind
         self._touched = Touched(services.workers)
-        self._appearance = Appearance()
         self._counts = Counter[str]()
 
     def solve(self, scene: Scene, strokes: Sequence[NodeId], lit: Lit, params: Any, job: Job) -> Solution:
@@ -110,7 +108,7 @@ class ElementRun(JointRun):
         vertex, element = np.unique(self._touched.owners(mesh, lit.casters.meshes, at), return_inverse=True)
         around = self._touched.light(scene, lit, vertex, job)
         rows = _rows_of(said, element, around.frames)
-        retold = Retold(painting.dressed, self._appearance)
+        retold = Retold(painting.dressed)
         now = retold.now(mesh.uvs[vertex], self._changed(painting, vertex, scene, lit))
         question = asked(around, rows, retold, now, params.strength, _meant(said, element, len(vertex)))
         meanings = [stroke.meaning for stroke in said.strokes if stroke.meaning != AUTOMATIC]

@@ -100,7 +100,7 @@ def settle(
     took = moved & _noticed(before.reflectance, then.reflectance) & ~chosen.flagged[:, None]
     word, those = _most(took, np.where(chosen.flagged, 0, question.wanted))
     if not named:
-        word, those = can, (took & question.meant[:, None]).any(axis=1)
+        word, those = can, np.asarray((took & question.meant[:, None]).any(axis=1))
     those = those if those.any() else np.ones(len(those), np.bool_)
     middle = [np.median(one[those], axis=0) for one in (numbers.diffuse, numbers.specular, numbers.level)]
     reflectance = Reflectance(middle[0], middle[1], float(middle[2]))

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from studio_plugins.slf.appearance import Appearance
+from studio_plugins.slf.appearance import shape_of
 from studio_plugins.slf.dressed import Dressed
 from studio_plugins.slf.ladder import LEVELS
 
@@ -47,13 +47,12 @@ class Albedos:
 
 
 class Retold:
-    """Of one material; keeps what its terms come to at each level of its gloss."""
+    """Of one material: what its terms come to at each level of its gloss."""
 
-    def __init__(self, dressed: Dressed, appearance: Appearance) -> None:
+    def __init__(self, dressed: Dressed) -> None:
         self._dressed = dressed
         brdf = dressed.resolved.brdf
-        every = [appearance.shape(brdf.address, brdf.terms, shape) for shape in dressed.shapes()]
-        self._fits = np.stack(every)
+        self._fits = np.stack([shape_of(brdf.address, brdf.terms, shape) for shape in dressed.shapes()])
 
     def now(self, uvs: F32, changes: Mapping[str, F32]) -> Numbers:
         """At places with texture coordinates (E, 2) and changes of parameters (E, 1 or 3) on them."""
