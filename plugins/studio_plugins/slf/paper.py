@@ -123,6 +123,15 @@ def _nearest(made: F64, systems: Systems) -> F64:
     return made
 
 
+def errors(systems: Systems, made: F64) -> F64:
+    """(R, L, K) weighted squared differences that reflectances (R, L, K, 2) leave."""
+    d, s = made[..., 0], made[..., 1]
+    c11, d1, bb = (one[:, None, None] for one in (systems.c11, systems.d1, systems.bb))
+    c12, c22, d2 = (one[..., None] for one in (systems.c12, systems.c22, systems.d2))
+    cost = c11 * d * d + 2 * c12 * d * s + c22 * s * s - 2 * d1 * d - 2 * d2 * s
+    return np.asarray(np.maximum(cost + bb, 0))
+
+
 def choose(
     systems: Systems, solver: Solver, literal: bool = False, may: tuple[bool, bool, bool] = ANYTHING
 ) -> Chosen:
@@ -143,11 +152,7 @@ def choose(
     }
     clean = dataclasses.replace(systems, **kept, now=_rescaled(np.nan_to_num(systems.now)))
     made = fits(clean, literal)
-    d, s = made[..., 0], made[..., 1]
-    c11, c12, c22 = (one.reshape(count, -1, 1) for one in (clean.c11, clean.c12, clean.c22))
-    d1, d2 = clean.d1.reshape(count, -1, 1), clean.d2[..., None]
-    cost = c11 * d * d + 2 * c12 * d * s + c22 * s * s - 2 * d1 * d - 2 * d2 * s
-    cost = np.maximum(cost + clean.bb[:, None, None], 0).reshape(elements, channels, levels, 4).sum(axis=1)
+    cost = errors(clean, made).reshape(elements, channels, levels, 4).sum(axis=1)
     own = np.arange(levels) == clean.level[:, None]
     changed = np.array([0, 1, 1, 2]) + np.where(own, 0, 1)[..., None]
     allowed = {"l0": changed <= 1, "l2": changed >= 2, "mixed": changed >= 0}[solver]

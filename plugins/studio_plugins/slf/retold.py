@@ -22,6 +22,8 @@ I64 = npt.NDArray[np.int64]
 Bools = npt.NDArray[np.bool_]
 
 AMOUNTS = np.concatenate([[0.0], np.geomspace(1e-3, 1.0, 40)])
+ROUNDS = 4
+"""Times that matte part and shine are found again, each beside the other."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,16 +96,28 @@ class Retold:
         """Those that come to what `then` says of what `moved` (E, 3): matte part, shine, gloss."""
         steps = np.where(moved[:, 2], then.level - before.nearest, 0)
         level = self._level_of(now, steps)
-        fits = self._at(level)
-        grey = np.broadcast_to(AMOUNTS[:, None, None], (len(AMOUNTS), *now.diffuse.shape))
-        shines = _summed(fits, self._dressed.coefficients(np.broadcast_to(now.diffuse, grey.shape), grey))[1]
-        specular = np.where(moved[:, 1:2], _crossing(shines, then.reflectance[..., 1]), now.specular)
-        ends = [np.zeros_like(now.diffuse), np.ones_like(now.diffuse)]
+        fits, diffuse, specular = self._at(level), now.diffuse, now.specular
+        for _ in range(ROUNDS):
+            shine = self._shine(fits, diffuse, then.reflectance[..., 1])
+            specular = np.where(moved[:, 1:2], shine, now.specular)
+            matte = self._matte(fits, specular, then.reflectance[..., 0], now.diffuse)
+            diffuse = np.where(moved[:, :1], matte, now.diffuse)
+        return Numbers(diffuse, specular, level)
+
+    def _shine(self, fits: F64, diffuse: F64, wanted: F64) -> F64:
+        """(E, 3) the amount whose shiny albedo, beside that matte part, is what is wanted."""
+        grey = np.broadcast_to(AMOUNTS[:, None, None], (len(AMOUNTS), *diffuse.shape))
+        beside = np.broadcast_to(diffuse, grey.shape)
+        return _crossing(_summed(fits, self._dressed.coefficients(beside, grey))[1], wanted)
+
+    def _matte(self, fits: F64, specular: F64, wanted: F64, else_: F64) -> F64:
+        """(E, 3) the matte part whose albedo, beside that shine, is what is wanted; `else_` if none shows."""
+        room = self._dressed.room(specular)
+        ends = (np.zeros_like(specular), room)
         low, high = (_summed(fits, self._dressed.coefficients(end, specular))[0] for end in ends)
         rise = high - low
-        made = (then.reflectance[..., 0] - low) / np.maximum(rise, 1e-9)
-        made = np.where(rise > 1e-9, np.clip(made, 0, self._dressed.room(specular)), now.diffuse)
-        return Numbers(np.where(moved[:, :1], made, now.diffuse), specular, level)
+        made = room * np.clip((wanted - low) / np.maximum(rise, 1e-9), 0, 1)
+        return np.where(rise > 1e-9, made, else_)
 
     def changes(self, now: Numbers, then: Numbers) -> dict[str, F32]:
         """By parameter what paint adds at elements: (E, 1) or (E, 3); without those that stay everywhere."""
