@@ -2,7 +2,7 @@
 
 What strokes want is told as for `joint`, as a difference; it is added to what the elements send towards the
 places it was painted from (`painted_rows`), and all their other directions are to stay as they are. Their
-answers become paint that varies from element to element.
+answers become paint that varies from element to element, with a point at each of them.
 """
 
 from __future__ import annotations

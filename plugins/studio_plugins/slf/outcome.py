@@ -65,7 +65,10 @@ class Canvas:
         }
         scene = self.scene.with_materials(*materials.values())
         field = self._field(scene, instead)
-        made = self.spread(scene, self.surfaces, field) if field.layers or field.varied else {}
+        made: dict[NodeId, Paint] = {}
+        if field.layers or field.varied:
+            painted = self.spread.on_elements if field.varied else self.spread
+            made = painted(scene, self.surfaces, field)
         others = {node for stroke in scene.of(Stroke) if not stroke.hidden for node in stroke.objects}
         paints: dict[NodeId, Paint | None] = dict.fromkeys(self.whose)
         for node, paint in made.items():
