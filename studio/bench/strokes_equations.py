@@ -1,10 +1,13 @@
 """The paper's equations 5 and 6 beside the true minimum, on moments of real elements of the sample room.
 
-A third of the elements want another matte part, a third another shine, a third another gloss, with noise.
-`paper/equation-5` and `-6`: `residual_printed` and `residual_minimum` are what the fit of one number leaves,
-over what was wanted to change (both as roots of sums of squares over the elements that want that number
-changed). `paper/SOLVER`: likewise of what the solver chooses, `named_right_…` the shares of elements in which
-it names what was changed, `name_changed` in how many the equations make another name.
+A third of the elements want another matte part, a third another shine, a third another gloss, with noise: in
+all directions (`paper/whole/…`), or in STROKED of them that weigh as those of a stroke do, while the others
+are to stay (`paper/stroke/…`).
+
+- `equation-5` and `-6`: `residual_printed` and `residual_minimum` are what the fit of one number leaves, over
+  what was wanted to change, as roots of sums of squares over the elements that want that number changed
+- SOLVER: likewise of what the solver chooses; `named_right_…` the shares of elements in which it names what
+  was changed, and `name_changed` of those in which the equations as printed make it another name
 """
 
 from __future__ import annotations
@@ -23,8 +26,11 @@ from studio_core.session import View
 from studio_core.shading.job import Job
 from studio_core.shading.offline import backend_params
 from studio_core.strokes.session import Easel
+from studio_core.transport.cells import CELLS, PARTS
+from studio_plugins.slf.by_element import STRENGTH
 from studio_plugins.slf.ladder import LEVELS
 from studio_plugins.slf.moments import moments
+from studio_plugins.slf.painted_rows import Columns, Rows, with_rows
 from studio_plugins.slf.paper import (
     BOTH,
     DIFFUSE,
@@ -48,30 +54,41 @@ EQUATIONS = {"equation-5": DIFFUSE, "equation-6": SPECULAR}
 ELEMENTS, QUICK_ELEMENTS = 2000, 300
 NOISE = 0.02
 GLOSS = 3
+STROKED, STEEPEST = 4, 12
+"""Directions of an element that a stroke has, within so many rings."""
 
 
 def run(report: Report, program: Headless) -> None:
     """All that is wanted."""
-    if not any(report.wants(f"paper/{name}") for name in (*EQUATIONS, *SOLVERS)):
-        return
-    systems, changed = elements_of(QUICK_ELEMENTS if report.quick else ELEMENTS, program)
+    wanted = [
+        where
+        for where in ("whole", "stroke")
+        if any(report.wants(f"paper/{where}/{name}") for name in (*EQUATIONS, *SOLVERS))
+    ]
+    if wanted:
+        count = QUICK_ELEMENTS if report.quick else ELEMENTS
+        whole, stroke, changed = elements_of(count, program)
+        for where in wanted:
+            _compare(report, f"paper/{where}", whole if where == "whole" else stroke, changed)
+
+
+def _compare(report: Report, where: str, systems: Systems, changed: I64) -> None:
     before = _cost(systems, np.full(len(changed), KEPT), systems.now)
     for name, kind in EQUATIONS.items():
-        if report.wants(f"paper/{name}"):
+        if report.wants(f"{where}/{name}"):
             own = (changed == kind) & (before > 0)
             for metric, literal in (("residual_printed", True), ("residual_minimum", False)):
                 made = fits(systems, literal)[np.arange(len(systems.now)), np.repeat(systems.level, 3), kind]
                 left = _cost(systems, changed, made)
-                report.add(f"paper/{name}", metric, _share(left[own], before[own]), "1")
+                report.add(f"{where}/{name}", metric, _share(left[own], before[own]), "1")
     for solver in SOLVERS:
-        if report.wants(f"paper/{solver}"):
-            _tell(report, solver, systems, changed, before)
+        if report.wants(f"{where}/{solver}"):
+            _tell(report, f"{where}/{solver}", solver, systems, changed, before)
 
 
-def _tell(report: Report, solver: Solver, systems: Systems, changed: I64, before: F64) -> None:
+def _tell(report: Report, case: str, solver: Solver, systems: Systems, changed: I64, before: F64) -> None:
     printed, true = choose(systems, solver, literal=True), choose(systems, solver)
     own = ~true.flagged & (before > 0)
-    case = f"paper/{solver}"
     for metric, one in (("residual_printed", printed), ("residual_minimum", true)):
         report.add(case, metric, _share(one.residual[own], before[own]), "1")
     names = [_name(one, systems) for one in (printed, true)]
@@ -82,8 +99,11 @@ def _tell(report: Report, solver: Solver, systems: Systems, changed: I64, before
     report.add(case, "elements", int(own.sum()), "1")
 
 
-def elements_of(count: int, program: Headless) -> tuple[Systems, I64]:
-    """Moments of elements of the sample room under its sky, and what each wants to be changed: (E,)."""
+def elements_of(count: int, program: Headless) -> tuple[Systems, Systems, I64]:
+    """Moments of elements of the sample room under its sky, wanting a change everywhere or where a stroke is.
+
+    And what each wants to be changed: (E,).
+    """
     scene = sample_scene("environment")
     backend = program.registry.get("backend", "reference")
     easel = Easel(backend, backend_params(backend, {"directions": "1024"}), program.services)
@@ -112,7 +132,13 @@ def elements_of(count: int, program: Headless) -> tuple[Systems, I64]:
     wanted = light_of(whole.sent(series, other, 0))
     wanted *= 1 + NOISE * rng.standard_normal(wanted.shape).astype(np.float32)
     both = np.stack([now.diffuse, now.specular], axis=2)
-    return moments(series, series_of(wanted), both, level), changed
+    element, cell = np.repeat(np.arange(count), STROKED), rng.integers(0, STEEPEST * PARTS, STROKED * count)
+    plain = whole.sent(series, now, 0)
+    sent = light_of(plain).reshape(count, 3, CELLS)[element, :, cell].astype(np.float64)
+    change = wanted.reshape(count, 3, CELLS)[element, :, cell] - sent
+    rows = Rows(element, cell, change, np.ones(len(cell)))
+    stroke = with_rows(moments(series, plain, both, level), Columns.of(series, rows), rows, sent, STRENGTH)
+    return moments(series, series_of(wanted), both, level), stroke, changed
 
 
 def _cost(systems: Systems, changed: I64, made: F64) -> F64:

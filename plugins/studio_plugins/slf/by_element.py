@@ -42,13 +42,16 @@ F64 = npt.NDArray[np.float64]
 I64 = npt.NDArray[np.int64]
 Bools = npt.NDArray[np.bool_]
 
+STRENGTH = 1e5
+"""σ_m: what a stroke does not show hardly holds it back, but decides where it tells nothing."""
+
 
 @dataclass(frozen=True)
 class Params:
     """Parameters of the solvers."""
 
     strength: float = param(
-        1e5, "Strength", "How many other directions a painted one counts as (σ_m)", low=0.0, high=1e9,
+        STRENGTH, "Strength", "How many other directions a painted one counts as (σ_m)", low=0.0, high=1e9,
         advanced=True,
     )  # fmt: skip
     literal: bool = param(
@@ -177,8 +180,8 @@ def _meant(said: Said, element: I64, count: int) -> Bools:
     return made if made.any() else ~made
 
 
-MIXED = ByElement("mixed", "Fewest changes, point by point (paper: mixed 1/5/25)")
-SPARSE = ByElement("l0", "One change, point by point (paper: L0)")
-FULL = ByElement("l2", "Everything, point by point (paper: L2)")
+MIXED = ByElement("mixed", "Paper: mixed, 1 / 5 / 25")
+SPARSE = ByElement("l0", "Paper: one change (L0)")
+FULL = ByElement("l2", "Paper: everything (L2)")
 
-__all__ = ["FULL", "MIXED", "SPARSE", "ByElement", "ElementRun"]
+__all__ = ["FULL", "MIXED", "SPARSE", "STRENGTH", "ByElement", "ElementRun"]

@@ -9,12 +9,16 @@ import pytest
 from plugins.slf.test_solver import JOB, Artist, changed, room
 
 from studio_core.contract import Services
+from studio_core.session import View
+from studio_core.shading.offline import backend_params
 from studio_core.strokes.painting import marks_of, stroke_of
+from studio_core.strokes.session import Easel
 from studio_core.strokes.stroke import Stroke
 from studio_plugins.slf.by_element import FULL, MIXED, SPARSE, Params
 
 SOLVERS = {"mixed": MIXED, "l0": SPARSE, "l2": FULL}
-BLUE = {"diffuse": (0.2, 0.4, 0.6)}
+BLUE = (0.2, 0.4, 0.6)
+ROOM, BLUER = room(), changed(diffuse=BLUE)
 
 
 class ByElementArtist(Artist):
@@ -23,6 +27,17 @@ class ByElementArtist(Artist):
     def __init__(self, services):
         super().__init__(services)
         self.runs = {name: solver.open(services) for name, solver in SOLVERS.items()}
+        self.known = {}
+
+    def picture(self, scene, width=80, height=60):
+        """Each scene is pictured once."""
+        if id(scene) not in self.known:
+            values = {"directions": "1024", "vertices": "1500"}
+            easel = Easel(self.backend, backend_params(self.backend, values), self.services)
+            camera = scene["camera"]
+            shown = easel.picture(scene, View(camera.transform, camera.fov, width, height), JOB)
+            self.known[id(scene)] = scene, (shown, easel)
+        return self.known[id(scene)][1]
 
     def ask(self, scene, *strokes, by="mixed", params=None):
         _, easel = self.picture(scene)
@@ -38,7 +53,7 @@ def artist(host, workers):
 
 @pytest.fixture(scope="module")
 def blue(artist):
-    return artist.stroke(room(), changed(**BLUE), noise=0.02)
+    return artist.stroke(ROOM, BLUER, noise=0.02)
 
 
 def values_are_valid(paint):
@@ -48,11 +63,11 @@ def values_are_valid(paint):
 @pytest.mark.parametrize("by", ["mixed", "l0"])
 @pytest.mark.parametrize("literal", [True, False])
 def test_another_colour_is_one_for_most_elements(artist, blue, by, literal):
-    solution, there = artist.ask(room(), blue, by=by, params=Params(literal=literal))
+    solution, there = artist.ask(ROOM, blue, by=by, params=Params(literal=literal))
     (finding,) = solution.findings
     first = finding.reasons[0]
     assert (finding.node, finding.slot, first.meaning) == ("ball", 0, "colour")
-    np.testing.assert_allclose(first.values["diffuse"], BLUE["diffuse"], atol=0.05)
+    np.testing.assert_allclose(first.values["diffuse"], BLUE, atol=0.05)
     assert first.explained > 0.8
     assert solution.counts["solved"] > 20
     paint = solution.edit(there)["ball"].paint
@@ -63,7 +78,7 @@ def test_another_colour_is_one_for_most_elements(artist, blue, by, literal):
 
 
 def test_full_least_squares_changes_everything(artist, blue):
-    solution, there = artist.ask(room(), blue, by="l2")
+    solution, there = artist.ask(ROOM, blue, by="l2")
     first = solution.findings[0].reasons[0]
     assert "colour" in first.meaning or first.meaning == "everything"
     assert " and " in first.meaning or first.meaning == "everything"
@@ -72,14 +87,14 @@ def test_full_least_squares_changes_everything(artist, blue):
 
 
 def test_what_is_as_it_was_stays(artist):
-    solution, there = artist.ask(room(), artist.stroke(room(), room()))
+    solution, there = artist.ask(ROOM, artist.stroke(ROOM, ROOM))
     assert solution.findings[0].reasons[0].meaning == ""
     paint = solution.edit(there)["ball"].paint
     assert paint is None or all(np.abs(t.values).max() < 0.02 for t in paint.changes.values())
 
 
 def test_what_somebody_chose_comes_first_and_is_all_that_changes(artist, blue):
-    solution, there = artist.ask(room(), dataclasses.replace(blue, meaning="shine"))
+    solution, there = artist.ask(ROOM, dataclasses.replace(blue, meaning="shine"))
     reasons = solution.findings[0].reasons
     assert [reasons[0].meaning, reasons[1].meaning] == ["shine", "colour"]
     assert [*solution.edit(there)["ball"].paint.changes] == ["specular"]
@@ -89,9 +104,9 @@ def test_what_somebody_chose_comes_first_and_is_all_that_changes(artist, blue):
 
 
 def test_a_second_stroke_goes_on_from_the_first(artist, blue):
-    solution, there = artist.ask(room(), blue)
+    solution, there = artist.ask(ROOM, blue)
     once = solution.edit(there)
-    black = artist.stroke(changed(**BLUE), changed(diffuse=(0.1, 0.2, 0.3)))
+    black = artist.stroke(BLUER, changed(diffuse=(0.1, 0.2, 0.3)))
     solution, there = artist.ask(once, once[blue.id], black)
     made = solution.findings[0].reasons[0]
     assert made.meaning == "colour"
@@ -99,8 +114,8 @@ def test_a_second_stroke_goes_on_from_the_first(artist, blue):
 
 
 def test_reach_ends_what_elements_change(artist, blue):
-    near = artist.stroke(room(), changed(**BLUE), part=0.35, near=30.0)
-    solution, there = artist.ask(room(), near)
+    near = artist.stroke(ROOM, BLUER, part=0.35, near=30.0)
+    solution, there = artist.ask(ROOM, near)
     paint = solution.edit(there)["ball"].paint
     height = paint.places[:, 1]
     change = np.abs(paint.change("diffuse")).max(axis=1)
@@ -122,9 +137,9 @@ def test_what_says_nothing_changes_nothing(artist, blue, by):
     if by != "joint":
         assert solution.counts["solved"] == 0
         assert solution.counts["skipped"] > 0
-    solution, _ = ask(room(), Stroke(id="empty", name="Empty"))
+    solution, _ = ask(ROOM, Stroke(id="empty", name="Empty"))
     assert (solution.findings, solution.notes) == ((), ("Empty lies on no surface",))
-    hidden = room().with_nodes(dataclasses.replace(room()["ball"], hidden=True))
+    hidden = ROOM.with_nodes(dataclasses.replace(ROOM["ball"], hidden=True))
     solution, there = ask(hidden, blue)
     assert solution.findings == ()
     assert solution.edit(there)["ball"] is there["ball"]
@@ -132,7 +147,7 @@ def test_what_says_nothing_changes_nothing(artist, blue, by):
 
 @pytest.mark.parametrize("by", [*SOLVERS, "joint"])
 def test_a_stroke_across_objects_and_the_sky_is_solved_on_each(artist, by):
-    before = room()
+    before = ROOM
     shown, _ = artist.picture(before)
     wanted = np.where(
         np.arange(shown.linear.size).reshape(shown.linear.shape) % 7 == 0, 1e6, 0.3 * shown.linear
