@@ -145,6 +145,14 @@ def test_what_says_nothing_changes_nothing(artist, blue, by):
     assert solution.edit(there)["ball"] is there["ball"]
 
 
+@pytest.mark.parametrize("by", [*SOLVERS])
+def test_elements_in_full_shadow_are_skipped_and_stay(artist, blue, by):
+    solution, there = artist.ask(room(light=0.0), blue, by=by)
+    assert solution.counts["solved"] > 0
+    assert solution.counts["skipped"] > 0
+    assert values_are_valid(solution.edit(there)["ball"].paint)
+
+
 @pytest.mark.parametrize("by", [*SOLVERS, "joint"])
 def test_a_stroke_across_objects_and_the_sky_is_solved_on_each(artist, by):
     before = ROOM
