@@ -2,7 +2,7 @@
 
 `lobe/LEVEL`: the operator (`slf.lobes`); `mip/LEVEL`: the mirrored light on 32 × 32 cells of equal solid
 angle, averaged over boxes as large as the lobe, between two levels (section 6.2). `operator_error` is the RMS
-difference over directions, over the mean.
+difference over directions, over the mean; `albedo` the most that a lobe sends back of light from anywhere.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import numpy.typing as npt
 from studio.bench.harness import Report
 from studio_core.kernels.directions import direction_set
 from studio_core.transport.cells import CELLS, PARTS, RINGS, cell_directions, cells_of
-from studio_plugins.slf.lobes import cell_weights, exponents, lobe, spectra
+from studio_plugins.slf.lobes import albedos, cell_weights, exponents, lobe, spectra
 
 F64 = npt.NDArray[np.float64]
 I64 = npt.NDArray[np.int64]
@@ -41,6 +41,8 @@ def run(report: Report) -> None:
             if report.wants(name):
                 off = math.sqrt(((made[cells] - true) ** 2).mean()) / true.mean()
                 report.add(name, "operator_error", off, "1")
+        if report.wants(names[0]):
+            report.add(names[0], "albedo", float(albedos(spectra())[level].max()), "1")
 
 
 def operated(level: int, light: F64) -> F64:

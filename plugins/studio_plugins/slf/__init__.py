@@ -15,6 +15,8 @@ Light Field Manipulation and Reflectance Optimization", 2013).
   and `trials` (columns of what others send), `changeable` and `candidates` (what may have changed),
   `recolouring` (the edit), `reflected` (the decision)
 - `explaining` (one decision), `outcome` (the edit, and why), `solver` (the door)
+- the paper's own solvers: `touched` (light at elements that strokes lie on), `painted_rows` (strokes in their
+  moments), `retold` (a model's numbers in the paper's terms), `elementwise` (each by itself), `by_element`
 - all elements at once: `links` (what they see), `lumitexels` and `series` (light of all directions), `lobes`,
   `skylight`, `straight`, `moments`, `mixed`, and `whole` above them
 - to be seen: `appearance`, `splatting`, `backend`; the whole scene sharpened: `stylise`
@@ -30,6 +32,9 @@ plugin = Plugin(
         "backend": {"slf": "studio_plugins.slf.backend:BACKEND"},
         "solver": {
             "joint": "studio_plugins.slf.solver:SOLVER",
+            "mixed": "studio_plugins.slf.by_element:MIXED",
+            "l0": "studio_plugins.slf.by_element:SPARSE",
+            "l2": "studio_plugins.slf.by_element:FULL",
         },
     },
 )

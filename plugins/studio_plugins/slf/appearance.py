@@ -29,22 +29,25 @@ FINER = 3  # directions along a cell's side
 LEAST = 1e-4  # albedo of a lobe that is none
 
 
-class Appearance:
-    """Of rows of `Shapes`; what is known of a shape is kept."""
+def shape_of(address: int, terms: int, shape: F32) -> F64:
+    """(terms, 3) of one shape (D,): at a coefficient of 1 the matte and the shiny albedo, and the real level.
 
-    def __init__(self) -> None:
-        self._known: dict[tuple[int, int, bytes], F64] = {}
+    What is known is kept.
+    """
+    return _fitted(address, terms, np.ascontiguousarray(shape, np.float32).tobytes())
+
+
+class Appearance:
+    """Of rows of `Shapes`."""
 
     def rows(self, shapes: Shapes) -> F64:
-        """(R, T, 3): by term, at a coefficient of 1, the matte and the shiny albedo, and the real level."""
+        """(R, T, 3) by term, as `shape_of` has them."""
         made = np.zeros((len(shapes.address), shapes.width, 3))
         ends = np.append(shapes.offset, len(shapes.data))[1:]
         for row in range(len(made)):
             shape = shapes.data[shapes.offset[row] : ends[row]]
-            key = (int(shapes.address[row]), int(shapes.terms[row]), shape.tobytes())
-            if key not in self._known:
-                self._known[key] = _fitted(*key[:2], np.ascontiguousarray(shape))
-            made[row, : key[1]] = self._known[key]
+            terms = int(shapes.terms[row])
+            made[row, :terms] = shape_of(int(shapes.address[row]), terms, shape)
         return made
 
     def of(self, shapes: Shapes, row: I64, coefficients: F32) -> Reflectances:
@@ -60,22 +63,18 @@ class Appearance:
         return Reflectances(matte / whole, shine / whole, level)
 
 
-def _fitted(address: int, terms: int, shape: F32) -> F64:
-    """(terms, 3) as `Appearance.rows` has them."""
-    lights, weights, lobes, albedo = _probes()
-    values = np.stack(
-        [
-            evaluate_at(address, terms, shape, [math.sin(t), 0.0, math.cos(t)], lights.astype(np.float32))
-            for t in HEIGHTS
-        ]
-    ).reshape(-1, terms)
-    values = np.nan_to_num(values.astype(np.float64))
+@functools.lru_cache(maxsize=256)
+def _fitted(address: int, terms: int, shape: bytes) -> F64:
+    lights, w, lobes, albedo, cross, squares = _probes()
+    given = np.frombuffer(shape, np.float32)
+    heights = [[math.sin(t), 0.0, math.cos(t)] for t in HEIGHTS]
+    values = np.stack([evaluate_at(address, terms, given, towards, lights) for towards in heights])
+    values = np.nan_to_num(values.reshape(-1, terms).astype(np.float64))
+    weighted = w[:, None] * values
+    ones, sums, crosses = w.sum(), weighted.sum(axis=0), lobes @ weighted
     made = np.zeros((terms, 3))
-    w = np.tile(weights, len(HEIGHTS))
-    ones, cross, squares = w.sum(), lobes @ w, (lobes**2) @ w
     for term in range(terms):
-        b = values[:, term]
-        first, second, rest = w @ b, lobes @ (w * b), w @ b**2
+        first, second, rest = sums[term], crosses[:, term], weighted[:, term] @ values[:, term]
         determinant = np.maximum(ones * squares - cross**2, 1e-12 * ones * squares)
         a = np.maximum((ones * second - cross * first) / determinant, 0)
         m = (first - a * cross) / ones
@@ -92,12 +91,16 @@ def _fitted(address: int, terms: int, shape: F32) -> F64:
             made[term] = math.pi * max(first / ones, 0), 0, 0
         else:
             made[term] = math.pi * m[best], a[best], level
+    made.setflags(write=False)
     return made
 
 
 @functools.cache
-def _probes() -> tuple[F64, F64, F64, F64]:
-    """Light's directions (P, 3), their measure (P,), the lobes (LEVELS, heights · P), their mean albedo."""
+def _probes() -> tuple[F32, F64, F64, F64, F64, F64]:
+    """Light's directions (P, 3), their measure (heights · P,) and the lobes (LEVELS, heights · P).
+
+    Then (LEVELS,) their mean albedo, their sums and those of their squares.
+    """
     theta = (np.arange(16 * FINER) + 0.5) * (math.pi / 32 / FINER)
     phi = (np.arange(64 * FINER) + 0.5) * (2 * math.pi / 64 / FINER)
     t, p = (one.ravel() for one in np.meshgrid(theta, phi, indexing="ij"))
@@ -107,7 +110,8 @@ def _probes() -> tuple[F64, F64, F64, F64]:
     views = np.array([[math.sin(h), 0.0, math.cos(h)] for h in HEIGHTS])
     made = np.stack([lobe(n, lights, views[:, None]).ravel() for n in exponents()])
     albedo = (made.reshape(LEVELS, len(HEIGHTS), -1) @ weights).mean(axis=1)
-    return lights, weights, made, albedo
+    w = np.tile(weights, len(HEIGHTS))
+    return lights.astype(np.float32), w, made, albedo, made @ w, (made**2) @ w
 
 
-__all__ = ["Appearance"]
+__all__ = ["Appearance", "shape_of"]

@@ -65,7 +65,7 @@ class Dressed:
     @property
     def white(self) -> bool:
         """Whether its shine has no colour of its own to choose."""
-        return "specular" in self.roles and not self._coloured("specular")
+        return "specular" in self.roles and not self.coloured("specular")
 
     # -- coefficients ------------------------------------------------------------------------------
 
@@ -75,7 +75,7 @@ class Dressed:
         values: dict[str, Any] = {**self.resolved.values}
         for role, colour in (("diffuse", diffuse), ("specular", specular)):
             if role in self.roles:
-                values[self.roles[role]] = colour if self._coloured(role) else colour.max(axis=-1)
+                values[self.roles[role]] = colour if self.coloured(role) else colour.max(axis=-1)
         played = {self.roles[role] for role in ("diffuse", "specular") if role in self.roles}
         count = diffuse.shape[:-1]
         every: dict[str, F32] = {}
@@ -162,14 +162,20 @@ class Dressed:
 
     def _texel(self, texture: Texture | None, uvs: F32) -> F64:
         """(3,) the mean of a picture at places."""
-        if texture is None or not len(uvs):
-            return np.ones(3)
+        made: F64 = np.ones(3) if not len(uvs) else self.texels(texture, uvs).mean(axis=0, dtype=np.float64)
+        return made
+
+    @staticmethod
+    def texels(texture: Texture | None, uvs: F32) -> F32:
+        """(N, 3) of a picture at places; 1 without one."""
+        if texture is None:
+            return np.ones((len(uvs), 3), np.float32)
         pixels = linear_rgb(texture.image)[::-1]
         height, width = pixels.shape[:2]
         at = texture.placed(uvs) % 1.0
         rows = np.minimum((at[:, 1] * height).astype(np.int64), height - 1)
         columns = np.minimum((at[:, 0] * width).astype(np.int64), width - 1)
-        made: F64 = pixels[rows, columns].mean(axis=0, dtype=np.float64)
+        made: F32 = pixels[rows, columns]
         return made
 
     # -- changes -----------------------------------------------------------------------------------
@@ -183,7 +189,7 @@ class Dressed:
         for role, before, after in pairs:
             if ROLES[role] in change:
                 delta = after - before
-                made[self.roles[role]] = delta if self._coloured(role) else delta[:1]
+                made[self.roles[role]] = delta if self.coloured(role) else delta[:1]
         if Change.GLOSS in change and gloss is not None:
             name, after_ = self.roles["gloss"], self.gloss_of(then.level)
             if self.infos[name].scale == "log":
@@ -198,12 +204,13 @@ class Dressed:
         for role, colour in (("diffuse", then.diffuse), ("specular", then.specular)):
             if role in self.roles:
                 red, green, blue = (float(c) for c in colour)
-                made[self.roles[role]] = (red, green, blue) if self._coloured(role) else red
+                made[self.roles[role]] = (red, green, blue) if self.coloured(role) else red
         if "gloss" in self.roles:
             made[self.roles["gloss"]] = self.gloss_of(then.level)
         return made
 
-    def _coloured(self, role: str) -> bool:
+    def coloured(self, role: str) -> bool:
+        """Whether the parameter that plays a part is a colour."""
         return np.ndim(self.resolved.values[self.roles[role]]) == 1
 
 

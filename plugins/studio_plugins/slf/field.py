@@ -32,11 +32,15 @@ class Decided:
 
 @dataclass(frozen=True, eq=False)
 class Varied:
-    """Changes by parameter (E, C) at elements, each times its weight (E,)."""
+    """Changes by parameter (E, C) at elements, each times its weight (E,).
+
+    With strokes, what lies between is times how alike it is the one that it is most alike.
+    """
 
     elements: Spots
     changes: Mapping[str, F32]
     weight: F32
+    strokes: Sequence[tuple[Spots, Reach]] = ()
 
 
 Layer = Sequence[Decided]
@@ -64,7 +68,8 @@ class Field:
     @property
     def marks(self) -> tuple[Spots, ...]:
         """Where something is known of what is wanted."""
-        return tuple(one.marks for layer in self.layers for one in layer)
+        of_elements = (marks for one in self.varied for marks, _ in one.strokes)
+        return (*(one.marks for layer in self.layers for one in layer), *of_elements)
 
     def at(self, spots: Spots, workers: Workers | None = None) -> dict[str, F32]:
         """By parameter (P, C) at places."""
@@ -83,8 +88,10 @@ class Field:
                 _add(made, name, part / most[:, None])
         for varied in self.varied:
             between = Upsampling.of(varied.elements, spots)
+            near = [likeness_of(spots, marks, reach, workers) for marks, reach in varied.strokes]
+            share = np.max(near, axis=0) if near else np.ones(len(spots), np.float32)
             for name, change in varied.changes.items():
-                _add(made, name, between(change, varied.weight))
+                _add(made, name, share[:, None] * between(change, varied.weight))
         return made
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -21,13 +21,14 @@ from studio_core.strokes.paintable import paintable
 from studio_core.strokes.solution import Finding, Reason
 from studio_core.strokes.solved import Solved
 from studio_core.strokes.stroke import FIXATE, Stroke
-from studio_plugins.slf.explaining import WORDS, Painting
-from studio_plugins.slf.field import Decided, Field, Layer
+from studio_plugins.slf.elementwise import ElementStep
+from studio_plugins.slf.explaining import WORDS, Painting, Step
+from studio_plugins.slf.field import Decided, Field, Varied
 from studio_plugins.slf.joint import SINGLE, Explanation
 from studio_plugins.slf.regions import Region
 from studio_plugins.slf.samples import F64
 from studio_plugins.slf.similarity import Reach
-from studio_plugins.slf.spots import SLOTS
+from studio_plugins.slf.spots import SLOTS, Spots
 from studio_plugins.slf.spread import Spread
 
 TOLD = 4
@@ -82,8 +83,10 @@ class Canvas:
             Instead(region, number) for region in self.found for number in range(1, len(self.told(region)))
         ]
         scene = self.scene.with_materials(*(painting.dressed.material for painting in self.found.values()))
-        field = Field([layer for region in self.found for layer in self._layers(scene, region, every)])
-        made = self.spread(scene, self.surfaces, field) if field.layers else {}
+        field, made = self._field(scene, every), dict[NodeId, Paint]()
+        if field.layers or field.varied:
+            lay = self.spread.on_elements if field.varied else self.spread
+            made = lay(scene, self.surfaces, field)
         alone = {
             instead: {node: _alone(paint, number) for node, paint in made.items()}
             for number, instead in enumerate(every)
@@ -115,51 +118,78 @@ class Canvas:
         for node, paint in made.items():
             if node in paints or node not in others:
                 paints[node] = paint
-        strokes: dict[NodeId, dict[str, Any]] = {}
+        fields: dict[NodeId, dict[str, Any]] = {}
         for painting in self.found.values():
             for stroke_id, offsets in painting.offsets.items():
-                values = strokes.setdefault(stroke_id, {})
+                values = fields.setdefault(stroke_id, {})
                 table = values.get("table", getattr(scene[stroke_id], "table", None))
                 values["table"] = _with_offsets(table, offsets)
         for stroke in self._strokes():
             beyond = (node for node, paint in paints.items() if paint is not None and node not in others)
             reached = tuple(beyond) if stroke.alike else ()
             if reached != stroke.reached:
-                strokes.setdefault(stroke.id, {})["reached"] = reached
+                fields.setdefault(stroke.id, {})["reached"] = reached
         for stroke_id, meaning in meanings.items():
-            strokes.setdefault(stroke_id, {})["meaning"] = meaning
+            fields.setdefault(stroke_id, {})["meaning"] = meaning
         for node, own in paints.items():
             for slot in np.unique(own.slots).tolist() if own is not None else ():
                 material = Region(node, int(slot)).material(scene)
                 if material is not None:
                     materials[material] = paintable(scene.material(material), self.services.registry)
         changed = tuple(new for name, new in materials.items() if new is not self.scene.material(name))
-        return Solved(label, frozen_map(paints), changed, frozen_map(strokes))
+        return Solved(label, frozen_map(paints), changed, frozen_map(fields))
 
     def _strokes(self) -> list[Stroke]:
         steps = [step for painting in self.found.values() for step in painting.steps]
         return [*{stroke.id: stroke for step in steps for stroke in step.strokes}.values()]
 
-    def _layers(self, scene: Scene, region: Region, every: Sequence[Instead | None]) -> Iterator[Layer]:
-        """The steps on a region, each with the changes of all that may be instead, side by side."""
+    def _field(self, scene: Scene, every: Sequence[Instead | None]) -> Field:
+        """All steps, each with the changes of all that may be instead, side by side.
+
+        Where a stroke lies on several regions its changes say one thing, and meet.
+        """
+        layers: dict[tuple[NodeId, ...], list[Decided]] = {}
+        varied: list[Varied] = []
+        for region, painting in self.found.items():
+            for step in painting.steps:
+                changes, marks = self._changes(region, step, every), self._marks(scene, region, step)
+                if not changes or not marks:
+                    continue
+                if isinstance(step, ElementStep):
+                    spots = self.spread.spots(scene, self.surfaces).some(step.vertex)
+                    varied.append(Varied(spots, changes, np.ones(len(spots), np.float32), marks))
+                else:
+                    strokes = tuple(stroke.id for stroke in step.strokes if stroke.tool != FIXATE)
+                    meeting = (Decided(own, reach, changes) for own, reach in marks)
+                    layers.setdefault(strokes, []).extend(meeting)
+        return Field([*layers.values()], varied)
+
+    def _changes(self, region: Region, step: Step, every: Sequence[Instead | None]) -> dict[str, Any]:
         painting = self.found[region]
+        made: dict[str, Any] = {}
+        for number, instead in enumerate(every):
+            one = step.verdict.best
+            if instead is not None and instead.region == region and step is painting.steps[-1]:
+                one = step.verdict.explanations[instead.number]
+            own: Mapping[str, Any] = (
+                step.answer(one)
+                if isinstance(step, ElementStep)
+                else painting.dressed.changes(step.now, step.gloss, one.reflectance, one.change)
+            )
+            made |= {f"{number}{BESIDE}{name}": change for name, change in own.items()}
+        return made
+
+    def _marks(self, scene: Scene, region: Region, step: Step) -> list[tuple[Spots, Reach]]:
+        """Where a step's strokes lie on a region, and how far each reaches."""
         part = self.surfaces.unrefined.mesh.index_of(region.node) * SLOTS + region.slot
-        for step in painting.steps:
-            changes: dict[str, F64] = {}
-            for number, instead in enumerate(every):
-                one = step.verdict.best
-                if instead is not None and instead.region == region and step is painting.steps[-1]:
-                    one = step.verdict.explanations[instead.number]
-                own = painting.dressed.changes(step.now, step.gloss, one.reflectance, one.change)
-                changes |= {f"{number}{BESIDE}{name}": change for name, change in own.items()}
-            layer = []
-            for stroke in step.strokes if changes else ():
+        made = []
+        for stroke in step.strokes:
+            if stroke.tool != FIXATE:
                 marks = self.spread.marks(scene, self.surfaces, stroke)
-                there = marks.some(marks.part == part)
-                if stroke.tool != FIXATE and len(there):
-                    layer.append(Decided(there, Reach.of(stroke), changes))
-            if layer:
-                yield layer
+                own = marks.some(marks.part == part)
+                if len(own):
+                    made.append((own, Reach.of(stroke)))
+        return made
 
 
 def _alone(paint: Paint, number: int) -> Paint | None:

@@ -27,6 +27,7 @@ KEPT, DIFFUSE, SPECULAR, BOTH = range(4)
 PIVOT = 1e-6
 """Columns whose angle has a smaller squared sine are one column."""
 TINY = 1e-300
+ANYTHING = (True, True, True)
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,8 +123,22 @@ def _nearest(made: F64, systems: Systems) -> F64:
     return made
 
 
-def choose(systems: Systems, solver: Solver, literal: bool = False) -> Chosen:
-    """Equation 4 over a solver's candidates: `l0` one parameter, `l2` all of them, `mixed` any by weights."""
+def errors(systems: Systems, made: F64) -> F64:
+    """(R, L, K) weighted squared differences that reflectances (R, L, K, 2) leave."""
+    d, s = made[..., 0], made[..., 1]
+    c11, d1, bb = (one[:, None, None] for one in (systems.c11, systems.d1, systems.bb))
+    c12, c22, d2 = (one[..., None] for one in (systems.c12, systems.c22, systems.d2))
+    cost = c11 * d * d + 2 * c12 * d * s + c22 * s * s - 2 * d1 * d - 2 * d2 * s
+    return np.asarray(np.maximum(cost + bb, 0))
+
+
+def choose(
+    systems: Systems, solver: Solver, literal: bool = False, may: tuple[bool, bool, bool] = ANYTHING
+) -> Chosen:
+    """Equation 4 over a solver's candidates: `l0` one parameter, `l2` all of them, `mixed` any by weights.
+
+    Of the matte part, the shine and the gloss only what `may` change does; `l2` changes all of that.
+    """
     count, levels = systems.c22.shape
     channels, elements = systems.channels, len(systems.c22) // systems.channels
     arrays = (systems.c11, systems.d1, systems.bb, systems.now, systems.c12, systems.c22, systems.d2)
@@ -137,19 +152,17 @@ def choose(systems: Systems, solver: Solver, literal: bool = False) -> Chosen:
     }
     clean = dataclasses.replace(systems, **kept, now=_rescaled(np.nan_to_num(systems.now)))
     made = fits(clean, literal)
-    d, s = made[..., 0], made[..., 1]
-    c11, c12, c22 = (one.reshape(count, -1, 1) for one in (clean.c11, clean.c12, clean.c22))
-    d1, d2 = clean.d1.reshape(count, -1, 1), clean.d2[..., None]
-    cost = c11 * d * d + 2 * c12 * d * s + c22 * s * s - 2 * d1 * d - 2 * d2 * s
-    cost = np.maximum(cost + clean.bb[:, None, None], 0).reshape(elements, channels, levels, 4).sum(axis=1)
+    cost = errors(clean, made).reshape(elements, channels, levels, 4).sum(axis=1)
     own = np.arange(levels) == clean.level[:, None]
     changed = np.array([0, 1, 1, 2]) + np.where(own, 0, 1)[..., None]
     allowed = {"l0": changed <= 1, "l2": changed >= 2, "mixed": changed >= 0}[solver]
+    matte, shine, gloss = may
     if solver == "l2":
         allowed = np.zeros_like(allowed)
-        allowed[:, :, BOTH] = True
+        allowed[:, :, matte * DIFFUSE + shine * SPECULAR] = True
     if solver == "l0":
         allowed = allowed & ~((changed == 0) & (np.arange(4) == KEPT))  # as printed: one always changes
+    allowed = allowed & np.array([True, matte, shine, matte and shine]) & (own | gloss)[..., None]
     weight = np.asarray(WEIGHTS)[np.maximum(changed, 1)] if solver == "mixed" else np.ones(changed.shape)
     rated = np.where(allowed, cost * weight, np.inf).reshape(elements, -1)
     best = np.argmin(rated, axis=1)

@@ -75,6 +75,17 @@ def half_level(level: npt.ArrayLike) -> I64:
     return np.asarray(np.clip(np.rint(2 * np.asarray(level)), 0, 2 * LEVELS - 2), np.int64)
 
 
+def sent_of(series: F32, diffuse: F64, specular: F64, row: I64) -> F32:
+    """The series of what N reflectances (N, 3) send of incident light (N, 3, RINGS, WIDTH), by rows (N,) of
+    `half_kernels`."""
+    made = np.zeros_like(series)
+    if specular.any():
+        convolve(series, half_kernels(), row, made)
+        made *= specular.astype(np.float32)[..., None, None]
+    made[..., 0] += (PARTS * matte_of(series) * diffuse)[..., None]
+    return made
+
+
 # Lengths are read from the arrays: loops of a length that is known are unrolled, and are no vector code then.
 # Four rows (rings) at a time take four terms each: what is between loops costs as much as they do.
 
@@ -187,5 +198,6 @@ def convolve(series: F32, kernels: F32, level: I64, out: F32) -> None:
 
 
 __all__ = [
-    "WIDTH", "convolve", "half_kernels", "half_level", "light_of", "matte_of", "series_of", "shares",
+    "WIDTH", "convolve", "half_kernels", "half_level", "light_of", "matte_of", "sent_of", "series_of",
+    "shares", "waves",
 ]  # fmt: skip

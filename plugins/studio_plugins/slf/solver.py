@@ -43,7 +43,7 @@ from studio_plugins.slf.outcome import Canvas, finding_of, label_of, told
 from studio_plugins.slf.places import Places, places_of
 from studio_plugins.slf.reflected import Reflected
 from studio_plugins.slf.regions import Region, regions_of, steps, touched
-from studio_plugins.slf.samples import F64, Samples
+from studio_plugins.slf.samples import F64, Reflectance, Samples
 from studio_plugins.slf.spread import Spread
 from studio_plugins.slf.stylise import Style, stylise
 
@@ -67,6 +67,25 @@ class Joint:
         return JointRun(services)
 
 
+@dataclass(frozen=True, eq=False)
+class Said:
+    """By stroke its samples and where they are; the material's mean there now, and its gloss."""
+
+    parts: tuple[tuple[Stroke, Samples, Places], ...]
+    now: Reflectance
+    gloss: float | None
+
+    @property
+    def strokes(self) -> tuple[Stroke, ...]:
+        """Those that say something."""
+        return tuple(stroke for stroke, _, _ in self.parts)
+
+    @property
+    def count(self) -> int:
+        """Of places."""
+        return sum(len(places) for _, _, places in self.parts)
+
+
 class JointRun:
     """Satisfies `studio_core.contract.StrokeRun`."""
 
@@ -76,7 +95,7 @@ class JointRun:
         self._spread = Spread(services)
         self._reflected = Reflected(services)
 
-    def solve(self, scene: Scene, strokes: Sequence[NodeId], lit: Lit, params: Params, job: Job) -> Solution:
+    def solve(self, scene: Scene, strokes: Sequence[NodeId], lit: Lit, params: Any, job: Job) -> Solution:
         """See `studio_core.contract.StrokeRun`."""
         asked = [node for node in map(scene.nodes.get, strokes) if isinstance(node, Stroke)]
         found, unpaintable = self.decided(scene, asked, lit, params, job)
@@ -185,9 +204,30 @@ class JointRun:
         group: tuple[Stroke, ...],
         scene: Scene,
         lit: Lit,
-        params: Params,
+        params: Any,
         job: Job,
     ) -> None:
+        said = self._said(painting, region, group, scene, lit, job)
+        if said is None:
+            return
+        dressed, parts = painting.dressed, said.parts
+        pooled = pooled_of(parts)
+        allowed = allowed_of(dressed, said.strokes)
+        tints = tints_of(pooled, dressed, said.now, said.strokes) if params.coloured else ()
+        verdict = decide(pooled, dressed, said.now, allowed, tints, exactness_of(said.strokes))
+        verdict = meant_first(verdict, dressed, group)
+        painting.take(Step(said.strokes, verdict, said.now, said.gloss, said.count))
+
+    def _said(
+        self,
+        painting: Painting,
+        region: Region,
+        group: tuple[Stroke, ...],
+        scene: Scene,
+        lit: Lit,
+        job: Job,
+    ) -> Said | None:
+        """What strokes say of a region's material; None where they do not lie on it."""
         parts: list[tuple[Stroke, Samples, Places]] = []
         dressed, mesh = painting.dressed, lit.surfaces.unrefined.mesh
         seen = []
@@ -197,7 +237,7 @@ class JointRun:
             if len(places):
                 seen.append((stroke, places))
         if not seen:
-            return
+            return None
         uvs = mesh.uvs[np.concatenate([places.vertex for _, places in seen])]
         now, gloss = dressed.now(uvs, painting.changes)
         shapes, own_shape = dressed.shapes(), dressed.own_shape(gloss)
@@ -208,14 +248,7 @@ class JointRun:
             samples, offset = samples_of(stroke, places, sums, dressed, now)
             painting.offsets.setdefault(stroke.id, []).append((places.mark, offset))
             parts.append((stroke, samples, places))
-        pooled = pooled_of(parts)
-        strokes = [stroke for stroke, _, _ in parts]
-        allowed = allowed_of(dressed, strokes)
-        tints = tints_of(pooled, dressed, now, strokes) if params.coloured else ()
-        verdict = decide(pooled, dressed, now, allowed, tints, exactness_of(strokes))
-        verdict = meant_first(verdict, dressed, group)
-        count = sum(len(places) for _, _, places in parts)
-        painting.take(Step(tuple(stroke for stroke, _, _ in parts), verdict, now, gloss, count))
+        return Said(tuple(parts), now, gloss)
 
     def _sums(
         self, dressed: Dressed, shapes: Any, stroke: Stroke, places: Places, scene: Scene, lit: Lit, job: Job

@@ -124,6 +124,32 @@ class Spread:
                     made[node.id] = paint
         return made
 
+    def on_elements(self, scene: Scene, surfaces: Surfaces, field: Field) -> dict[NodeId, Paint]:
+        """The paint of changes that vary from element to element, wherever these lie.
+
+        Between its points paint is as elements are upsampled. What ends somewhere, or follows pictures, needs
+        more points.
+        """
+        base = surfaces.unrefined
+        if field.layers or any(reach != Reach() for one in field.varied for _, reach in one.strokes):
+            return self(scene, surfaces, field)
+        every = joined([one.elements for one in field.varied], self.spots(scene, surfaces))
+        some = np.unique(np.column_stack([every.place, every.part]), axis=0, return_index=True)[1]
+        spots = every.some(some)
+        changes, made = field.at(spots, self._workers), dict[NodeId, Paint]()
+        for index in np.unique(spots.part // SLOTS).tolist():
+            placed, own = base.mesh.objects[index], spots.part // SLOTS == index
+            node = scene[placed.node]
+            assert isinstance(node, MeshObject)
+            if any(self._pictures.pictures(scene, node)):
+                return self(scene, surfaces, field)
+            turn, scale, shift = frame_of(placed.transform, base.mesh.origin)
+            place, normal = (spots.place[own] - shift) @ turn.T / scale, spots.normal[own] @ turn.T
+            here = {name: values[own] for name, values in changes.items() if values[own].any()}
+            if here:
+                made[node.id] = Paint.of(place, normal, spots.part[own] % SLOTS, here)
+        return made
+
     def _on(
         self, scene: Scene, base: Surfaces, field: Field, index: int, vertices: Spots, under: Paint | None
     ) -> Paint | None:

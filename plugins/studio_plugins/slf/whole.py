@@ -25,13 +25,11 @@ from studio_plugins.slf.lumitexels import LightField
 from studio_plugins.slf.mixed import choose_all
 from studio_plugins.slf.moments import moments
 from studio_plugins.slf.paper import Solver
-from studio_plugins.slf.series import (
+from studio_plugins.slf.series import (, matte_of
     WIDTH,
-    convolve,
-    half_kernels,
     half_level,
     light_of,
-    matte_of,
+    sent_of,
     series_of,
 )
 from studio_plugins.slf.skylight import averages
@@ -173,13 +171,7 @@ class Whole:
     def sent(self, series: F32, of: Reflectances, start: int) -> F32:
         """The series of what elements from `start` on send of the incident light's."""
         own = slice(start, start + len(series))
-        specular = of.specular[own].astype(np.float32)[..., None, None]
-        made = np.zeros_like(series)
-        if specular.any():
-            convolve(series, half_kernels(), half_level(of.level[own]), made)
-            made *= specular
-        made[..., 0] += (PARTS * matte_of(series) * of.diffuse[own])[..., None]
-        return made
+        return sent_of(series, of.diffuse[own], of.specular[own], half_level(of.level[own]))
 
     def bounced(self, of: Reflectances, field: LightField, job: Checkpoints | None = None) -> LightField:
         """What all send of what `field` sends: one bounce more."""

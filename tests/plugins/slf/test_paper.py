@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from studio_plugins.slf.mixed import choose_all
 from studio_plugins.slf.paper import BOTH, DIFFUSE, KEPT, SPECULAR, Systems, choose, fits
 
 LEVELS = 4
@@ -80,21 +81,43 @@ def test_solvers_change_as_many_parameters_as_they_may(solver, literal):
         assert (least <= made.residual + 1e-9).all()
 
 
+def million(rng, count=100_000):
+    """A tenth of a million systems: conditions up to 1e16, some dark, some with numbers that are none."""
+    one = systems(rng, count, 10.0 ** rng.uniform(0, 16, count))
+    dark, broken = rng.random(count) < 0.05, rng.random(count) < 0.05
+    for array in (one.c11, one.c12, one.c22, one.d1, one.d2, one.bb):
+        array[dark] = 0
+        array[broken & ~dark] = rng.choice([np.nan, np.inf, -np.inf])
+    return one, dark | broken
+
+
+def sound(made, one, flagged):
+    assert np.isfinite(made.reflectance).all()
+    assert (made.reflectance >= 0).all()
+    assert (made.reflectance.sum(axis=1) <= 1 + 1e-9).all()
+    assert np.isfinite(made.residual).all()
+    np.testing.assert_array_equal(made.flagged, flagged)
+    assert (made.kind[made.flagged] == KEPT).all()
+    np.testing.assert_array_equal(made.reflectance[made.flagged], one.now[made.flagged])
+
+
 def test_a_million_systems_of_any_condition_come_out_finite_and_feasible():
     rng = np.random.default_rng(3)
     for part in range(10):
-        count = 100_000
-        one = systems(rng, count, 10.0 ** rng.uniform(0, 8, count))
-        dark, broken = rng.random(count) < 0.05, rng.random(count) < 0.05
-        for array in (one.c11, one.c12, one.c22, one.d1, one.d2, one.bb):
-            array[dark] = 0
-            array[broken & ~dark] = rng.choice([np.nan, np.inf, -np.inf])
-        for solver in ("l0", "mixed", "l2") if part == 0 else ("mixed",):
-            made = choose(one, solver, literal=part % 2 == 1)
-            assert np.isfinite(made.reflectance).all()
-            assert (made.reflectance >= 0).all()
-            assert (made.reflectance.sum(axis=1) <= 1 + 1e-9).all()
-            assert np.isfinite(made.residual).all()
-            np.testing.assert_array_equal(made.flagged, dark | broken)
-            assert (made.kind[made.flagged] == KEPT).all()
-            np.testing.assert_array_equal(made.reflectance[made.flagged], one.now[made.flagged])
+        one, flagged = million(rng)
+        for solver in ("l0", "mixed", "l2"):
+            sound(choose_all(one, solver), one, flagged)
+        if part < 3:
+            sound(choose(one, ("l0", "mixed", "l2")[part], literal=True), one, flagged)
+
+
+@pytest.mark.parametrize("may", [(1, 0, 0), (0, 1, 1), (0, 0, 1), (1, 1, 0)])
+@pytest.mark.parametrize("solver", ["l0", "mixed", "l2"])
+def test_only_what_may_change_does(solver, may):
+    one, may = systems(np.random.default_rng(4), 300), tuple(map(bool, may))
+    made = choose(one, solver, literal=True, may=may)
+    assert may[0] or not np.isin(made.kind, (DIFFUSE, BOTH)).any()
+    assert may[1] or not np.isin(made.kind, (SPECULAR, BOTH)).any()
+    assert may[2] or (made.level == one.level).all()
+    if solver == "l2":
+        assert (made.kind == may[0] * DIFFUSE + may[1] * SPECULAR).all()
