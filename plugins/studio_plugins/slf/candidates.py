@@ -18,6 +18,7 @@ import numpy.typing as npt
 
 from studio_plugins.slf.changeable import DIFFUSE, GLOSS, SPECULAR, Look, Region
 from studio_plugins.slf.fixates import Rows
+from studio_plugins.slf.influence import Columns
 from studio_plugins.slf.joint import NOISE, PLACES, TINTS_APART
 from studio_plugins.slf.ladder import LEVELS
 from studio_plugins.slf.trials import Node
@@ -58,7 +59,8 @@ class Moments:
     """Of one region at L levels, relative to the region as it is.
 
     left = rest + Σ_c Δ_cᵀ gram_c Δ_c − 2 Δ_c · light_c, with Δ (T, 3) changes of coefficients; levels (L,),
-    gram (L, 3, T, T), light (L, 3, T), rest (L, 3).
+    gram (L, 3, T, T), light (L, 3, T), rest (L, 3). From products of two sets of rays, whose noise is not
+    the same, it is without bias, and may come out below 0.
     """
 
     levels: F64
@@ -69,21 +71,34 @@ class Moments:
     @classmethod
     def of(cls, rows: Rows, nodes: list[Node], region: int, at: Sequence[Between]) -> Moments:
         """At levels between nodes."""
-        width = max(node.columns.terms.shape[2] for node in nodes)
-        share = np.array([one.share for one in at])
-        first, second = [one.first for one in at], [one.second for one in at]
-        every = np.zeros((len(nodes), len(rows), width, 3))
-        for node, into in zip(nodes, every, strict=True):
-            into[:, : node.columns.terms.shape[2]] = node.columns.terms[:, region]
-        whole = np.stack([node.columns.whole[:, region] for node in nodes])
-        by = share[:, None, None, None]
-        terms = (1 - by) * every[first] + by * every[second]
-        sent = (1 - by[..., 0]) * whole[first] + by[..., 0] * whole[second]
-        importance, wanted = rows.importance, rows.change - (sent - whole[0])
-        weighed = (importance[:, None] * terms).transpose(0, 3, 2, 1)  # (L, 3, T, P)
+        importance = rows.importance
+        sides = []
+        for number in range(len(nodes[0].sides)):
+            terms, sent = _between_nodes([node.sides[number] for node in nodes], region, at)
+            sides.append((terms, rows.change - sent))  # (L, P, T, 3), (L, P, 3)
+        grams, lights, rests = [], [], []
+        for (terms, wanted), (other, wish) in itertools.permutations(sides, 2):
+            weighed = (importance[:, None] * terms).transpose(0, 3, 2, 1)  # (L, 3, T, P)
+            grams.append(weighed @ other.transpose(0, 3, 1, 2))
+            lights.append((weighed @ wish.transpose(0, 2, 1)[..., None])[..., 0])
+            rests.append((importance * wanted * wish).sum(axis=1))
+        levels = np.array([one.level for one in at])
+        return cls(levels, *(np.mean(values, axis=0) for values in (grams, lights, rests)))
+
+    @classmethod
+    def noise(cls, rows: Rows, nodes: list[Node], region: int, at: Sequence[Between]) -> Moments:
+        """How far the mean of all sets of rays is off, squared, in place of what is left."""
+        made = [
+            _between_nodes([node.sides[number] for node in nodes], region, at)
+            for number in range(len(nodes[0].sides))
+        ]
+        terms, sent = ((one - other) / 2 for one, other in zip(*made, strict=True))
+        weighed = (rows.importance[:, None] * terms).transpose(0, 3, 2, 1)
         gram = weighed @ terms.transpose(0, 3, 1, 2)
-        light = (weighed @ wanted.transpose(0, 2, 1)[..., None])[..., 0]
-        return cls(np.array([one.level for one in at]), gram, light, (importance * wanted**2).sum(axis=1))
+        light = -(weighed @ sent.transpose(0, 2, 1)[..., None])[..., 0]
+        return cls(
+            np.array([one.level for one in at]), gram, light, (rows.importance * sent**2).sum(axis=1)
+        )
 
     def left(self, changes: F64) -> F64:
         """(L, N, 3) of changes (N, T, 3) of coefficients."""
@@ -92,6 +107,20 @@ class Moments:
         square = ((by @ self.gram[:, :, :width, :width]) * by).sum(axis=3)
         linear = (by @ self.light[:, :, :width, None])[..., 0]
         return np.asarray((self.rest[..., None] + square - 2 * linear).transpose(0, 2, 1))
+
+
+def _between_nodes(sides: Sequence[Columns], region: int, at: Sequence[Between]) -> tuple[F64, F64]:
+    """Of one region at levels between nodes: columns (L, P, T, 3), and what it sends more than now."""
+    width = max(one.terms.shape[2] for one in sides)
+    every = np.zeros((len(sides), len(sides[0].terms), width, 3))
+    for one, into in zip(sides, every, strict=True):
+        into[:, : one.terms.shape[2]] = one.terms[:, region]
+    whole = np.stack([one.whole[:, region] for one in sides])
+    first, second = [one.first for one in at], [one.second for one in at]
+    by = np.array([one.share for one in at])[:, None, None, None]
+    terms = (1 - by) * every[first] + by * every[second]
+    sent = (1 - by[..., 0]) * whole[first] + by[..., 0] * whole[second] - whole[0]
+    return terms, sent
 
 
 class Between(NamedTuple):

@@ -70,15 +70,16 @@ class Reflected:
         rows = rows_of(asked, surfaces, NOBODY if covered is None else covered.vertices, now)
         if not len(rows) or not (rows.importance * rows.change**2).sum() > 0:
             return Reflections(notes=("The stroke wants no change of what is reflected.",))
-        sight = self._sights.of(scene, surfaces, lit.casters, known, rows, job)
+        sights = self._sights.of(scene, surfaces, lit.casters, known, rows, job)
         own = [(surfaces.nodes[i], s) for i, s in _under(rows, surfaces.mesh)]
         regions, region = regions_of(scene, surfaces, own, self._services.registry)
         if not regions:
             return Reflections(notes=("Nothing whose material could change lights the stroke.",))
-        nodes = self._trials(scene, surfaces, known, rows, sight, regions, region, job)
+        nodes = self._trials(scene, surfaces, known, rows, sights, regions, region, job)
         pooled, share = rows.pooled(surfaces.mesh.positions)
         found = candidates(pooled, [node.pooled(share) for node in nodes], regions, allowed(asked))
-        counts = {"rows": len(rows), "regions": len(regions), "rays": sight.traced, "candidates": len(found)}
+        traced = sum(sight.traced for sight in sights)
+        counts = {"rows": len(rows), "regions": len(regions), "rays": traced, "candidates": len(found)}
         return Reflections(self._findings(scene, asked, regions, found), (), counts)
 
     def _findings(

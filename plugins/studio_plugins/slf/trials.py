@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -30,18 +31,20 @@ TRIED = (3.0, 7.0, 11.0, 14.0, 16.0, 18.0)
 
 @dataclass(frozen=True, eq=False)
 class Node:
-    """Columns with all regions at one gloss level; level −1: as they are, in the models that they have."""
+    """Columns with all regions at one gloss level, by each set of rays; level −1: as they are, in the models
+    that they have.
+    """
 
     level: float
-    columns: Columns
+    sides: tuple[Columns, ...]
 
     def pooled(self, share: npt.NDArray[np.float64]) -> Node:
         """Means of the rows, by shares (K, P)."""
-        terms, whole = self.columns.terms, self.columns.whole
-        return Node(
-            self.level,
-            Columns(np.einsum("kp,pgtc->kgtc", share, terms), np.einsum("kp,pgc->kgc", share, whole)),
+        made = (
+            Columns(np.einsum("kp,pgtc->kgtc", share, one.terms), np.einsum("kp,pgc->kgc", share, one.whole))
+            for one in self.sides
         )
+        return Node(self.level, tuple(made))
 
 
 class Trials:
@@ -58,19 +61,20 @@ class Trials:
         surfaces: Surfaces,
         known: Exchange,
         rows: Rows,
-        sight: Sight,
+        sights: Sequence[Sight],
         regions: list[Region],
         region: I32,
         job: Job,
     ) -> list[Node]:
         """As they are, then at each of TRIED; where a region has no gloss its columns there are 0."""
         services, surface = self._services, known.surface
-        some = sight.hit(len(region)) & (region >= 0)
+        some = np.any([sight.hit(len(region)) for sight in sights], axis=0) & (region >= 0)
         arrivals = Arrivals(known, surfaces, some, services.workers, job)
-        importance = Importance(known, surfaces, sight, rows, job)
+        importance = Importance(known, surfaces, sights, rows, job)
         light, own = arrivals.weighed(known.shapes, surface.row, surface.separated, surface.coefficients)
-        first = columns(sight, region, len(regions), light, own, services, job)
-        nodes = [Node(-1.0, importance.add(first, region, surface, importance.albedos))]
+        far = importance.of(region, len(regions), surface, importance.albedos)
+        seen = (columns(sight, region, len(regions), light, own, services, job) for sight in sights)
+        nodes = [Node(-1.0, tuple(one.plus(far) for one in seen))]
         glossy = [number for number, one in enumerate(regions) if GLOSS in one.full.roles]
         if not glossy:
             return nodes
@@ -84,9 +88,9 @@ class Trials:
         for number, level in enumerate(TRIED):
             row = np.where(where[region] >= 0, where[region] * len(TRIED) + number, -1).astype(np.int32)
             light, tried = arrivals.weighed(shapes, row, separated, looks)
-            near = columns(sight, region, len(regions), light, tried, services, job)
-            everywhere = dataclasses.replace(tried, row=row)
-            nodes.append(Node(level, importance.add(near, region, everywhere, albedos)))
+            far = importance.of(region, len(regions), dataclasses.replace(tried, row=row), albedos)
+            seen = (columns(sight, region, len(regions), light, tried, services, job) for sight in sights)
+            nodes.append(Node(level, tuple(one.plus(far) for one in seen)))
         return nodes
 
 
