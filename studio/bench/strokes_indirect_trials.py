@@ -14,6 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
+from scipy.spatial import cKDTree
 
 from studio.bench.interreflection_scenes import Setting, furniture, room
 from studio.bench.interreflection_truth import scene_key
@@ -48,15 +49,19 @@ ALIKE = 0.8
 """Cosine of the angle between normals of a stroke's places and of its middle."""
 LEAST = 0.003
 """Change of the light under a stroke, relative and RMS, that makes a trial."""
+OFF = 0.25
+"""Of the light by way of others: where picture and paths differ by more, parts overlap, and nobody paints."""
 DIM = 0.3
 """Of the mean light: darker places are not painted on."""
-SCREENED = 128
-"""Paths a vertex of each of two batches that tell whether a change makes a trial."""
+SCREENED, FEW = 128, 4
+"""Paths a vertex, of every fourth, of each of two batches that tell whether a change makes a trial."""
 PATHS, BATCHES, QUIET = 1024, 6, 0.1
 """Of what is painted: paths a vertex of a batch, and so many batches until its noise is that small."""
 KNOWN = 0.3
 """Noise of the truth, of the change, above which it is none."""
 SHOWN_BOUNCES = 3
+NEAR = 0.6
+"""Metres from a surface within which its gloss is seen."""
 TRIES = 300
 LEVELS_APART = 0.12
 """Of roughness α: glosses that are nearer are not told apart by eye."""
@@ -149,13 +154,24 @@ class Stage:
         away = np.linalg.norm(mesh.positions[own] - mesh.positions[middle], axis=1)
         return np.asarray(own[np.argsort(away, kind="stable")[:PLACES]])
 
+    def _near(self, node: NodeId, slot: int) -> I64:
+        """Seen vertices near one slot's: how sharply it shines is seen nowhere else."""
+        mesh = self.surfaces.mesh
+        own = mesh.material == self.surfaces.materials.index(self._slot_material(node, slot))
+        away = cKDTree(mesh.positions[own]).query(mesh.positions[self.seen], distance_upper_bound=NEAR)[0]
+        near = self.seen[np.isfinite(away)]
+        return near if len(near) else self.seen
+
     def trial(self, role: str, rng: np.random.Generator) -> IndirectTrial | None:
         """One that is drawn; None where none is found."""
         bright = DIM * float(self.straight[self.seen].mean())
         slots = slots_of(self.scene)
         for _ in range(TRIES):
-            some = self.patch(int(rng.choice(self.seen)))
+            middle = int(rng.choice(self.seen))
             node, slot = slots[int(rng.integers(len(slots)))]
+            if role == "gloss":
+                middle = int(rng.choice(self._near(node, slot)))
+            some = self.patch(middle)
             seed = int(rng.integers(1 << 20))
             own = self.surfaces.mesh.material[some[0]]
             name = self._slot_material(node, slot)
@@ -168,9 +184,23 @@ class Stage:
             if self.straight[some].mean() < bright:
                 continue
             made = self._truth(change, some, seed)
-            if made is not None:
-                return self._painted(some, *made, change)
+            if made is None:
+                continue
+            light, moved, noise = made
+            own = np.flatnonzero(self._as_shown(some, light))
+            if len(own) >= FEWEST:
+                shown = (light + self.straight[some])[own]
+                return self._painted(some[own], shown, moved[own], noise, change)
         return None
+
+    def _as_shown(self, some: I64, light: F64) -> npt.NDArray[np.bool_]:
+        """Where the picture shows about this light: not what lies inside of other parts."""
+        assert self.lit.indirect is not None
+        terms = self.lit.indirect.layer.terms[some]
+        width = min(terms.shape[1], self.weights.shape[1])
+        shown = (terms[:, :width] * self.weights[some][:, :width]).sum(axis=(1, 2))
+        true = light.sum(axis=1)
+        return np.asarray(np.abs(shown - true) < OFF * np.maximum(true, 0))
 
     def _truth(self, change: Change, some: I64, seed: int) -> tuple[F64, F64, float] | None:
         """Light before, how it changes, and that change's noise; None where that is too little or too noisy.
@@ -186,20 +216,20 @@ class Stage:
             self._cache.put(kept, *how)
         if not len(kept["noise"]):
             return None
-        return kept["light"] + self.straight[some], kept["moved"], float(kept["noise"][0, 0])
+        return kept["light"], kept["moved"], float(kept["noise"][0, 0])
 
     def _traced(self, change: Change, some: I64, seed: int) -> tuple[F64, F64, float] | None:
-        light, moved = (np.zeros((0, len(some), 3)) for _ in range(2))
+        light = moved = np.zeros((0, 0, 3))
         noise = 0.0
-        for paths, most in ((SCREENED, 2), (PATHS, BATCHES)):
-            light, moved = light[:0], moved[:0]
+        for own, paths, most in ((some[::FEW], SCREENED, 2), (some, PATHS, BATCHES)):
+            light, moved = np.zeros((2, 0, len(own), 3))
             while len(moved) < most:
-                one, other = self._moved(change, some, paths, BATCHES * seed + len(moved))
+                one, other = self._moved(change, own, paths, BATCHES * seed + len(moved))
                 light, moved = np.concatenate([light, one[None]]), np.concatenate([moved, other[None]])
                 if len(moved) == 1:
                     continue
                 size, noise = size_and_noise(moved)
-                if size < LEAST * (light.mean() + self.straight[some].mean()):
+                if size < LEAST * (light.mean() + self.straight[own].mean()):
                     return None
                 if noise * np.sqrt(paths * len(moved) / (PATHS * BATCHES)) > KNOWN:
                     return None
@@ -249,8 +279,10 @@ def trials(
     """So many, each with a trial for every one of the roles that was found; the same ones each time."""
     made = stages(program)
     for number in range(count):
-        stage, found = made[number % len(made)], {}
+        found = {}
         for role in roles:
+            # no gloss of the first scene is seen in 0.3 % of the light
+            stage = made[-1 if role == "gloss" else number % len(made)]
             one = stage.trial(role, np.random.default_rng((seed, number, CHANGES.index(role))))
             if one is not None:
                 found[role] = one

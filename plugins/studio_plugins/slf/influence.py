@@ -301,11 +301,19 @@ def add_columns(
             if source >= 0:
                 its = count[r]
                 at = base[r] + np.int64(cell[p, j]) * its
-                for k in range(its):
-                    share, t = outgoing[at + k], term[first[r] + k]
-                    sums[t, 0] += share * received[source + k, 0]
-                    sums[t, 1] += share * received[source + k, 1]
-                    sums[t, 2] += share * received[source + k, 2]
+                k = np.int64(0)
+                while k < its:  # functions of a term lie together
+                    t = term[first[r] + k]
+                    red, green, blue = np.float32(0.0), np.float32(0.0), np.float32(0.0)
+                    while k < its and term[first[r] + k] == t:
+                        share = outgoing[at + k]
+                        red += share * received[source + k, 0]
+                        green += share * received[source + k, 1]
+                        blue += share * received[source + k, 2]
+                        k += 1
+                    sums[t, 0] += red
+                    sums[t, 1] += green
+                    sums[t, 2] += blue
             for t in range(width):
                 for c in range(3):
                     value = weight[p, j, c] * sums[t, c]

@@ -8,6 +8,7 @@ is written.
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -26,9 +27,11 @@ from studio_plugins.slf.fixates import NOBODY, Rows, rows_of
 from studio_plugins.slf.influence import Sights
 from studio_plugins.slf.joint import CLOSE
 from studio_plugins.slf.recolouring import edit_of
-from studio_plugins.slf.trials import Trials
+from studio_plugins.slf.trials import Node, Trials
 
 F64 = npt.NDArray[np.float64]
+STRANGE = 2.0
+"""Times the light that is shown at a row: where the light of others is more, it says nothing."""
 SHOWN = 4
 """Objects that are told of."""
 
@@ -76,7 +79,7 @@ class Reflected:
         if not regions:
             return Reflections(notes=("Nothing whose material could change lights the stroke.",))
         nodes = self._trials(scene, surfaces, known, rows, sights, regions, region, job)
-        pooled, share = rows.pooled(surfaces.mesh.positions)
+        pooled, share = _known(rows, nodes[0]).pooled(surfaces.mesh.positions)
         found = candidates(pooled, [node.pooled(share) for node in nodes], regions, allowed(asked))
         traced = sum(sight.traced for sight in sights)
         counts = {"rows": len(rows), "regions": len(regions), "rays": traced, "candidates": len(found)}
@@ -107,6 +110,16 @@ class Reflected:
             values[name] = numbers[0] if len(numbers) == 1 else (numbers[0], numbers[1], numbers[2])
         edit = edit_of(scene, region, one.look, one.values)
         return Reason(one.meaning, one.explained, one.score, values, edit)
+
+
+def _known(rows: Rows, now: Node) -> Rows:
+    """Without weight where others are thought to give much more light than is shown there.
+
+    Such rows stand for what is buried in other things; being dark, they would count most of all.
+    """
+    arriving = np.mean([side.whole.sum(axis=(1, 2)) for side in now.sides], axis=0)
+    strange = arriving > STRANGE * rows.light.sum(axis=1)
+    return rows if strange.all() else dataclasses.replace(rows, weight=rows.weight * ~strange)
 
 
 def _under(rows: Rows, mesh: Any) -> set[tuple[int, int]]:
