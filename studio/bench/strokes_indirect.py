@@ -1,8 +1,8 @@
 """Recovery in indirect mode: whether a stroke finds the object, and what of it, whose change lights it so.
 
-Cases are joint/indirect/STROKE/NOISE/PARAMETER. What is painted is the light after the change (`shape`) or its
-mean (`flat`), at vertices; NOISE is normal, of the RMS of the change that is painted, which is 0.3 % of the
-light or more. `right_parameter` is the share of trials whose first finding is that object with that
+Cases are joint/indirect/STROKE/NOISE/PARAMETER. What is painted is the light after the change (`shape`) or
+its mean (`flat`), at vertices; NOISE is normal, of the RMS of the change that is painted, which is 0.3 % of
+the light or more. `right_parameter` is the share of trials whose first finding is that object with that
 parameter and no other; `value_error` is as in `strokes_recovery`; `told` is the share of those that are not
 right in which the right object and parameter is among the other reasons.
 """

@@ -318,10 +318,14 @@ def slots_of(scene: Scene) -> list[tuple[NodeId, int]]:
 
 
 def other(material: Material, role: str, rng: np.random.Generator, registry: Registry) -> Material | None:
-    """With another colour, shine or gloss; what has no shine becomes *Colour and shine*. None: it has none."""
+    """With another colour, shine or gloss; None where it has none. What cannot shine becomes what can."""
     roles = material_roles(material, registry)
     if role == "diffuse":
-        return None if role not in roles else _with(material, roles[role], _colour(material, roles, rng, registry))
+        return (
+            None
+            if role not in roles
+            else _with(material, roles[role], _colour(material, roles, rng, registry))
+        )
     full = paintable(material, registry)
     roles = material_roles(full, registry)
     if not {"specular", "gloss"} <= roles.keys():

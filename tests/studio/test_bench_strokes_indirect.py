@@ -12,7 +12,15 @@ from studio.bench import strokes_indirect, strokes_indirect_trials
 from studio.bench.harness import Report
 from studio.bench.interreflection_scenes import Setting
 from studio.bench.strokes_indirect import is_told, judged, painted
-from studio.bench.strokes_indirect_trials import CHANGES, Change, Stage, apart, other, size_and_noise, slots_of
+from studio.bench.strokes_indirect_trials import (
+    CHANGES,
+    Change,
+    Stage,
+    apart,
+    other,
+    size_and_noise,
+    slots_of,
+)
 from studio.headless import Headless
 from studio_core.contract import Services
 from studio_core.edits import Compound

@@ -35,10 +35,22 @@ LOOSE = np.linspace(0.92, 1.08, 9)
 """Columns know how much light comes back in all at another gloss no better than that."""
 
 
+class Between(NamedTuple):
+    """A level that lies between two nodes, `share` of the way to the second."""
+
+    level: float
+    first: int
+    second: int
+    share: float
+
+
+NOW = (Between(-1.0, 0, 0, 0.0),)
+
+
 @dataclass(frozen=True, eq=False)
 class Candidate:
     """One region's change: its meaning (`strokes.stroke.MEANINGS`), the look it starts from, values by role;
-    what it leaves of the wanted change (squared, relative), and the score, lower is better.
+    what it leaves of the wanted change (squared, relative), and the score, lower is better; `at` which level.
     """
 
     region: int
@@ -47,11 +59,26 @@ class Candidate:
     values: Mapping[str, F64]
     left: float
     score: float
+    at: Between = NOW[0]
 
     @property
     def explained(self) -> float:
         """1 − left."""
         return 1 - self.left
+
+    def predicted(self, nodes: list[Node]) -> list[F64]:
+        """(P, 3) by each set of rays: how columns say that light changes."""
+        values = {role: value[None] for role, value in self.values.items() if role != GLOSS}
+        made = []
+        for number in range(len(nodes[0].sides)):
+            terms, sent = _between_nodes([node.sides[number] for node in nodes], self.region, [self.at])
+            light = sent[0]
+            if values:
+                change = self.look.coefficients(values)[0] - self.look.plain
+                width = min(len(change), terms.shape[2])
+                light = light + np.einsum("ptc,tc->pc", terms[0, :, :width], change[:width])
+            made.append(light)
+        return made
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,13 +96,16 @@ class Moments:
     rest: F64
 
     @classmethod
-    def of(cls, rows: Rows, nodes: list[Node], region: int, at: Sequence[Between]) -> Moments:
-        """At levels between nodes."""
+    def of(
+        cls, rows: Rows, nodes: list[Node], region: int, at: Sequence[Between], off: Sequence[F64] = ()
+    ) -> Moments:
+        """At levels between nodes; `off` (P, 3) for each set of rays is what columns do not know of."""
         importance = rows.importance
         sides = []
         for number in range(len(nodes[0].sides)):
             terms, sent = _between_nodes([node.sides[number] for node in nodes], region, at)
-            sides.append((terms, rows.change - sent))  # (L, P, T, 3), (L, P, 3)
+            known = rows.change - off[number] if off else rows.change
+            sides.append((terms, known - sent))  # (L, P, T, 3), (L, P, 3)
         grams, lights, rests = [], [], []
         for (terms, wanted), (other, wish) in itertools.permutations(sides, 2):
             weighed = (importance[:, None] * terms).transpose(0, 3, 2, 1)  # (L, 3, T, P)
@@ -84,21 +114,6 @@ class Moments:
             rests.append((importance * wanted * wish).sum(axis=1))
         levels = np.array([one.level for one in at])
         return cls(levels, *(np.mean(values, axis=0) for values in (grams, lights, rests)))
-
-    @classmethod
-    def noise(cls, rows: Rows, nodes: list[Node], region: int, at: Sequence[Between]) -> Moments:
-        """How far the mean of all sets of rays is off, squared, in place of what is left."""
-        made = [
-            _between_nodes([node.sides[number] for node in nodes], region, at)
-            for number in range(len(nodes[0].sides))
-        ]
-        terms, sent = ((one - other) / 2 for one, other in zip(*made, strict=True))
-        weighed = (rows.importance[:, None] * terms).transpose(0, 3, 2, 1)
-        gram = weighed @ terms.transpose(0, 3, 1, 2)
-        light = -(weighed @ sent.transpose(0, 2, 1)[..., None])[..., 0]
-        return cls(
-            np.array([one.level for one in at]), gram, light, (rows.importance * sent**2).sum(axis=1)
-        )
 
     def left(self, changes: F64) -> F64:
         """(L, N, 3) of changes (N, T, 3) of coefficients."""
@@ -123,50 +138,56 @@ def _between_nodes(sides: Sequence[Columns], region: int, at: Sequence[Between])
     return terms, sent
 
 
-class Between(NamedTuple):
-    """A level that lies between two nodes, `share` of the way to the second."""
-
-    level: float
-    first: int
-    second: int
-    share: float
-
-
-NOW = (Between(-1.0, 0, 0, 0.0),)
-
-
 def candidates(
     rows: Rows, nodes: list[Node], regions: list[Region], allowed: frozenset[str]
 ) -> list[Candidate]:
     """The best change of each kind of each region, best first; `allowed` meanings."""
     made: list[Candidate] = []
     for number, region in enumerate(regions):
-        own = Moments.of(rows, nodes[:1], number, NOW)
-        found = [*_colours(number, region, own)]
-        if SPECULAR in region.now.roles:
-            found += _shine(number, region.now, own)
-        if GLOSS in region.full.roles and len(nodes) > 1:
-            found += _glosses(number, region, rows, nodes)
+        found = _of_region(number, region, rows, nodes)
         made += _best_of_each(one for one in found if one.meaning in allowed)
     return sorted(made, key=lambda one: one.score)
 
 
-def _glosses(number: int, region: Region, rows: Rows, nodes: list[Node]) -> Iterator[Candidate]:
+def fitted_again(
+    one: Candidate, made: Sequence[F64], rows: Rows, nodes: list[Node], region: Region
+) -> Candidate:
+    """A candidate whose change was carried forward, made (P, 3) for each set of rays, in place of columns."""
+    off = [then - now for then, now in zip(made, one.predicted(nodes), strict=True)]
+    found = [
+        found for found in _of_region(one.region, region, rows, nodes, off) if found.meaning == one.meaning
+    ]
+    return min(found, key=lambda one: one.score)
+
+
+def _of_region(
+    number: int, region: Region, rows: Rows, nodes: list[Node], off: Sequence[F64] = ()
+) -> Iterator[Candidate]:
+    own = Moments.of(rows, nodes[:1], number, NOW, off)
+    yield from _colours(number, region, own)
+    if SPECULAR in region.now.roles:
+        yield from _shine(number, region.now, own, NOW)
+    if GLOSS in region.full.roles and len(nodes) > 1:
+        yield from _glosses(number, region, rows, nodes, off)
+
+
+def _glosses(
+    number: int, region: Region, rows: Rows, nodes: list[Node], off: Sequence[F64]
+) -> Iterator[Candidate]:
     """Changes to levels other than today's, if the region shines at all today."""
     full, at = region.full, _between(region, nodes)
     if not at:
         return
-    levels = Moments.of(rows, nodes, number, at)
+    levels = Moments.of(rows, nodes, number, at, off)
     if region.full is region.now and full.shiny:
         left = _loosely(full, levels)
         best = int(np.argmin(left))
         level = float(levels.levels[best])
         score = score_of(float(left[best]), 1, abs(level - full.level) / LEVELS)
-        yield Candidate(
-            number, "gloss", full, {GLOSS: np.asarray(full.gloss_at(level))}, float(left[best]), score
-        )
+        values = {GLOSS: np.asarray(full.gloss_at(level))}
+        yield Candidate(number, "gloss", full, values, float(left[best]), score, at[best])
     if SPECULAR in full.roles:
-        yield from _shine(number, full, levels)
+        yield from _shine(number, full, levels, at)
 
 
 def _between(region: Region, nodes: list[Node]) -> list[Between]:
@@ -225,7 +246,7 @@ def _loosely(look: Look, levels: Moments) -> F64:
     return np.asarray(np.minimum(mid + slope * at + bend * at**2, left.min(axis=1)))
 
 
-def _shine(number: int, look: Look, levels: Moments) -> Iterator[Candidate]:
+def _shine(number: int, look: Look, levels: Moments, between: Sequence[Between]) -> Iterator[Candidate]:
     """More or less shine: of its own colour or white, of any colour; another level is one number more."""
     info, now = look.infos[look.roles[SPECULAR]], look.at(SPECULAR)
     grid = info.low + (info.high - info.low) * np.linspace(0, 1, STEPS) ** 2
@@ -240,7 +261,8 @@ def _shine(number: int, look: Look, levels: Moments) -> Iterator[Candidate]:
         at = float(levels.levels[level])
         gloss = {GLOSS: np.asarray(look.gloss_at(at))} if other else {}
         score = score_of(rest, numbers + other, _size(value, now))
-        return Candidate(number, meaning, look, {SPECULAR: value, **gloss}, rest, score)
+        values = {SPECULAR: value, **gloss}
+        return Candidate(number, meaning, look, values, rest, score, between[level])
 
     if now.ndim == 0:
         found = left(grid).sum(axis=2)
@@ -276,4 +298,4 @@ def _size(value: F64, now: F64) -> float:
     return float(np.sqrt(np.mean((value - now) ** 2)))
 
 
-__all__ = ["Candidate", "Moments", "candidates", "score_of"]
+__all__ = ["Candidate", "Moments", "candidates", "fitted_again", "score_of"]

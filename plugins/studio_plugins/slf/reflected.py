@@ -21,15 +21,18 @@ from studio_core.scene.nodes import NodeId, Scene
 from studio_core.shading.job import Job
 from studio_core.strokes.solution import Finding, Lit, Reason
 from studio_core.strokes.stroke import AUTOMATIC, FIXATE, MEANINGS, Stroke
-from studio_plugins.slf.candidates import Candidate, candidates, score_of
+from studio_plugins.slf.candidates import Candidate, candidates, fitted_again, score_of
 from studio_plugins.slf.changeable import Region, regions_of
 from studio_plugins.slf.fixates import NOBODY, Rows, rows_of
+from studio_plugins.slf.forward import Forward
 from studio_plugins.slf.influence import Sights
 from studio_plugins.slf.joint import CLOSE
 from studio_plugins.slf.recolouring import edit_of
 from studio_plugins.slf.trials import Node, Trials
 
 F64 = npt.NDArray[np.float64]
+NEARLY, CARRIED = 16.0, 4
+"""At rest, candidates whose scores are that near to the best one's are carried forward; at most so many."""
 STRANGE = 2.0
 """Times the light that is shown at a row: where the light of others is more, it says nothing."""
 SHOWN = 4
@@ -80,7 +83,19 @@ class Reflected:
             return Reflections(notes=("Nothing whose material could change lights the stroke.",))
         nodes = self._trials(scene, surfaces, known, rows, sights, regions, region, job)
         pooled, share = _known(rows, nodes[0]).pooled(surfaces.mesh.positions)
-        found = candidates(pooled, [node.pooled(share) for node in nodes], regions, allowed(asked))
+        means = [node.pooled(share) for node in nodes]
+        found = candidates(pooled, means, regions, allowed(asked))
+        carried = [one for one in found if one.score - found[0].score < NEARLY][:CARRIED]
+        if lit.indirect is not None and lit.indirect.final and carried:
+            looks = self._trials.looks(scene, surfaces)
+            forward = Forward(known, surfaces, sights, self._trials.separator, self._services, job)
+            for one in carried:
+                made = [
+                    share @ each for each in forward(one, regions[one.region], region == one.region, looks)
+                ]
+                found.remove(one)
+                found.append(fitted_again(one, made, pooled, means, regions[one.region]))
+            found.sort(key=lambda one: one.score)
         traced = sum(sight.traced for sight in sights)
         counts = {"rows": len(rows), "regions": len(regions), "rays": traced, "candidates": len(found)}
         return Reflections(self._findings(scene, asked, regions, found), (), counts)

@@ -52,7 +52,7 @@ class Trials:
 
     def __init__(self, services: Services) -> None:
         self._services = services
-        self._separator = Separator()
+        self.separator = Separator()
         self._coefficients = VertexCoefficients(services)
 
     def __call__(
@@ -79,10 +79,9 @@ class Trials:
         if not glossy:
             return nodes
         shapes = _shapes(regions, glossy)
-        separated = self._separator(shapes, *known.separation, job)
+        separated = self.separator(shapes, *known.separation, job)
         albedos = term_albedos(separated)
-        other = {m: paintable(scene.material(m), services.registry) for m in surfaces.materials}
-        looks = self._coefficients(scene.with_materials(*other.values()), surfaces)
+        looks = self.looks(scene, surfaces)
         where = np.full(len(regions) + 1, -1, np.int32)
         where[glossy] = np.arange(len(glossy))
         for number, level in enumerate(TRIED):
@@ -92,6 +91,11 @@ class Trials:
             seen = (columns(sight, region, len(regions), light, tried, services, job) for sight in sights)
             nodes.append(Node(level, tuple(one.plus(far) for one in seen)))
         return nodes
+
+    def looks(self, scene: Scene, surfaces: Surfaces) -> F32:
+        """(V, T, 3) coefficients with every material in a model that has all roles, where there is one."""
+        other = [paintable(scene.material(name), self._services.registry) for name in surfaces.materials]
+        return self._coefficients(scene.with_materials(*other), surfaces)
 
 
 def _shapes(regions: list[Region], glossy: list[int]) -> Shapes:

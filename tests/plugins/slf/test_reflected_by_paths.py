@@ -56,6 +56,5 @@ def test_paths_see_the_change_that_was_painted(painting: Painting, model: str, v
     best = found.findings[0]
     assert best.node == "side"
     made = by_paths(painting, best.reasons[0].edit(painting.scene), some) - before
-    print("LEFT", ((made - wanted) ** 2).sum() / (wanted**2).sum(), made.mean(axis=0) / wanted.mean(axis=0), best.reasons[0].meaning, dict(best.reasons[0].values))
     assert ((made - wanted) ** 2).sum() < 0.05 * (wanted**2).sum()
     np.testing.assert_allclose(made.mean(axis=0), wanted.mean(axis=0), rtol=0.1)
