@@ -17,7 +17,7 @@ import numpy as np
 
 from studio.bench.harness import Report
 from studio.bench.strokes_indirect_trials import CHANGES, Change, IndirectTrial, trials
-from studio.bench.strokes_recovery import QUICK_TRIALS, TRIALS, WORDS, Tally, relative
+from studio.bench.strokes_recovery import WORDS, Tally, relative
 from studio.headless import Headless
 from studio_core.edits import Add
 from studio_core.shading.job import Job
@@ -29,6 +29,7 @@ from studio_core.strokes.stroke import REPLACE, Stroke
 SOLVER = "joint"
 STROKES = ("shape", "flat")
 NOISES = (0.0, 0.02, 0.1, 0.3)
+TRIALS, QUICK_TRIALS = 20, 1
 
 
 def run(report: Report, program: Headless) -> None:
