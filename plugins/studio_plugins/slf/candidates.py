@@ -87,7 +87,7 @@ class Moments:
 
     left = rest + Σ_c Δ_cᵀ gram_c Δ_c − 2 Δ_c · light_c, with Δ (T, 3) changes of coefficients; levels (L,),
     gram (L, 3, T, T), light (L, 3, T), rest (L, 3). From products of two sets of rays, whose noise is not
-    the same, it is without bias, and may come out below 0.
+    the same, it is without bias, and may come out below 0; of one set, the noise of its rays is in it.
     """
 
     levels: F64
@@ -107,7 +107,8 @@ class Moments:
             known = rows.change - off[number] if off else rows.change
             sides.append((terms, known - sent))  # (L, P, T, 3), (L, P, 3)
         grams, lights, rests = [], [], []
-        for (terms, wanted), (other, wish) in itertools.permutations(sides, 2):
+        pairs = itertools.permutations(sides, 2) if len(sides) > 1 else [(sides[0], sides[0])]
+        for (terms, wanted), (other, wish) in pairs:
             weighed = (importance[:, None] * terms).transpose(0, 3, 2, 1)  # (L, 3, T, P)
             grams.append(weighed @ other.transpose(0, 3, 1, 2))
             lights.append((weighed @ wish.transpose(0, 2, 1)[..., None])[..., 0])

@@ -75,10 +75,18 @@ class Sights:
         return sum(side.nbytes for side in self._sides)
 
     def of(
-        self, scene: Scene, surfaces: Surfaces, casters: Casters, known: Exchange, rows: Rows, job: Job
+        self,
+        scene: Scene,
+        surfaces: Surfaces,
+        casters: Casters,
+        known: Exchange,
+        rows: Rows,
+        job: Job,
+        sides: int = SIDES,
     ) -> tuple[Sight, ...]:
-        """What the rows see now, by each set of rays; only what is not known is traced."""
-        return tuple(side.of(scene, surfaces, casters, known, rows, job) for side in self._sides)
+        """What the rows see now, by each of so many sets of rays; only what is not known is traced."""
+        own = self._sides[:sides]
+        return tuple(side.of(scene, surfaces, casters, known, rows, job) for side in own)
 
 
 class _Side:

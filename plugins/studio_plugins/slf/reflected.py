@@ -25,14 +25,14 @@ from studio_plugins.slf.candidates import Candidate, candidates, fitted_again, s
 from studio_plugins.slf.changeable import Region, regions_of
 from studio_plugins.slf.fixates import NOBODY, Rows, rows_of
 from studio_plugins.slf.forward import Forward
-from studio_plugins.slf.influence import Sights
+from studio_plugins.slf.influence import SIDES, Sights
 from studio_plugins.slf.joint import CLOSE
 from studio_plugins.slf.recolouring import edit_of
 from studio_plugins.slf.trials import Node, Trials
 
 F64 = npt.NDArray[np.float64]
 NEARLY, CARRIED = 16.0, 4
-"""At rest, candidates whose scores are that near to the best one's are carried forward; at most so many."""
+"""At rest candidates whose scores are that near to the best one's are carried forward; at most so many."""
 STRANGE = 2.0
 """Times the light that is shown at a row: where the light of others is more, it says nothing."""
 SHOWN = 4
@@ -76,7 +76,8 @@ class Reflected:
         rows = rows_of(asked, surfaces, NOBODY if covered is None else covered.vertices, now)
         if not len(rows) or not (rows.importance * rows.change**2).sum() > 0:
             return Reflections(notes=("The stroke wants no change of what is reflected.",))
-        sights = self._sights.of(scene, surfaces, lit.casters, known, rows, job)
+        resting = lit.indirect is not None and lit.indirect.final
+        sights = self._sights.of(scene, surfaces, lit.casters, known, rows, job, SIDES if resting else 1)
         own = [(surfaces.nodes[i], s) for i, s in _under(rows, surfaces.mesh)]
         regions, region = regions_of(scene, surfaces, own, self._services.registry)
         if not regions:
@@ -85,19 +86,19 @@ class Reflected:
         pooled, share = _known(rows, nodes[0]).pooled(surfaces.mesh.positions)
         means = [node.pooled(share) for node in nodes]
         found = candidates(pooled, means, regions, allowed(asked))
-        carried = [one for one in found if one.score - found[0].score < NEARLY][:CARRIED]
-        if lit.indirect is not None and lit.indirect.final and carried:
+        near = [one for one in found if one.score - found[0].score < NEARLY][: CARRIED if resting else 0]
+        if near:
             looks = self._trials.looks(scene, surfaces)
             forward = Forward(known, surfaces, sights, self._trials.separator, self._services, job)
-            for one in carried:
-                made = [
-                    share @ each for each in forward(one, regions[one.region], region == one.region, looks)
-                ]
-                found.remove(one)
-                found.append(fitted_again(one, made, pooled, means, regions[one.region]))
-            found.sort(key=lambda one: one.score)
+            again = []
+            for one in near:
+                made = forward(one, regions[one.region], region == one.region, looks)
+                means_of = [share @ each for each in made]
+                again.append(fitted_again(one, means_of, pooled, means, regions[one.region]))
+            found = sorted([*again, *found[len(near) :]], key=lambda one: one.score)
         traced = sum(sight.traced for sight in sights)
         counts = {"rows": len(rows), "regions": len(regions), "rays": traced, "candidates": len(found)}
+        counts["carried"] = len(near)
         return Reflections(self._findings(scene, asked, regions, found), (), counts)
 
     def _findings(
