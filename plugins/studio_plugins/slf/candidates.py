@@ -19,7 +19,7 @@ import numpy.typing as npt
 from studio_plugins.slf.changeable import DIFFUSE, GLOSS, SPECULAR, Look, Region
 from studio_plugins.slf.fixates import Rows
 from studio_plugins.slf.influence import Columns
-from studio_plugins.slf.joint import NOISE, PLACES, TINTS_APART
+from studio_plugins.slf.joint import CLOSE, NOISE, PLACES, TINTS_APART
 from studio_plugins.slf.ladder import LEVELS
 from studio_plugins.slf.trials import Node
 
@@ -29,6 +29,8 @@ STEPS = 33
 SIZE = 1.0
 """What a change of a whole parameter's range costs in score: of two that explain alike, the smaller one."""
 PARTS = 8
+TWO = CLOSE
+"""What shine with gloss costs beside its numbers: as well explained by one of them, one it is."""
 OTHER = 0.5
 """Levels that are nearer to today's are no change of gloss."""
 LOOSE = np.linspace(0.92, 1.08, 9)
@@ -262,6 +264,7 @@ def _shine(number: int, look: Look, levels: Moments, between: Sequence[Between])
         at = float(levels.levels[level])
         gloss = {GLOSS: np.asarray(look.gloss_at(at))} if other else {}
         score = score_of(rest, numbers + other, _size(value, now))
+        score += TWO if meaning == "shine and gloss" else 0.0
         values = {SPECULAR: value, **gloss}
         return Candidate(number, meaning, look, values, rest, score, between[level])
 
