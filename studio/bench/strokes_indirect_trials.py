@@ -11,6 +11,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import cast
 
 import numpy as np
 import numpy.typing as npt
@@ -20,7 +21,7 @@ from studio.bench.interreflection_scenes import Setting, furniture, room
 from studio.bench.interreflection_truth import scene_key
 from studio.headless import Headless
 from studio_core.arrays import frozen_map
-from studio_core.contract import Registry
+from studio_core.contract import PaintableBrdf, Registry
 from studio_core.folders import user_cache
 from studio_core.params import Value, defaults
 from studio_core.scene.nodes import Material, MeshObject, NodeId, Scene
@@ -336,11 +337,11 @@ def other(material: Material, role: str, rng: np.random.Generator, registry: Reg
             more = np.clip(shine * rng.choice([0.2, 0.4, 1.8, 2.5]), 0, 0.95)
             return _with(full, roles["specular"], _plain(more))
         made = _with(full, roles["specular"], _plain(np.full(shine.shape, rng.uniform(0.3, 0.9))))
-        model = registry.brdf(full.model)
+        model = cast(PaintableBrdf, registry.brdf(full.model))
         return _with(made, roles["gloss"], float(model.gloss(float(rng.uniform(0.15, 0.45)))))
     if shine.max() <= 0:
         return None
-    model = registry.brdf(full.model)
+    model = cast(PaintableBrdf, registry.brdf(full.model))
     alpha = float(model.alpha(float(np.asarray(_value(full, roles["gloss"], registry)))))
     while True:
         new = float(rng.uniform(0.1, 0.7))
