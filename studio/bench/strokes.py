@@ -15,6 +15,7 @@ IN_PARTS = True
 PARTS = (
     ("studio.bench.strokes_recovery", "run"),
     ("studio.bench.strokes_equations", "run"),
+    ("studio.bench.strokes_indirect", "run"),
     ("studio.bench.strokes_size", "run"),
     ("studio.bench.strokes_spread", "upsampling"),
     ("studio.bench.strokes_direct", "direct"),

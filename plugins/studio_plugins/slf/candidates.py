@@ -18,7 +18,8 @@ import numpy.typing as npt
 
 from studio_plugins.slf.changeable import DIFFUSE, GLOSS, SPECULAR, Look, Region
 from studio_plugins.slf.fixates import Rows
-from studio_plugins.slf.joint import NOISE, PLACES, TINTS_APART
+from studio_plugins.slf.influence import Columns
+from studio_plugins.slf.joint import CLOSE, NOISE, PLACES, TINTS_APART
 from studio_plugins.slf.ladder import LEVELS
 from studio_plugins.slf.trials import Node
 
@@ -28,70 +29,12 @@ STEPS = 33
 SIZE = 1.0
 """What a change of a whole parameter's range costs in score: of two that explain alike, the smaller one."""
 PARTS = 8
+TWO = CLOSE
+"""What shine with gloss costs beside its numbers: as well explained by one of them, one it is."""
 OTHER = 0.5
 """Levels that are nearer to today's are no change of gloss."""
 LOOSE = np.linspace(0.92, 1.08, 9)
 """Columns know how much light comes back in all at another gloss no better than that."""
-
-
-@dataclass(frozen=True, eq=False)
-class Candidate:
-    """One region's change: its meaning (`strokes.stroke.MEANINGS`), the look it starts from, values by role;
-    what it leaves of the wanted change (squared, relative), and the score, lower is better.
-    """
-
-    region: int
-    meaning: str
-    look: Look
-    values: Mapping[str, F64]
-    left: float
-    score: float
-
-    @property
-    def explained(self) -> float:
-        """1 − left."""
-        return 1 - self.left
-
-
-@dataclass(frozen=True, eq=False)
-class Moments:
-    """Of one region at L levels, relative to the region as it is.
-
-    left = rest + Σ_c Δ_cᵀ gram_c Δ_c − 2 Δ_c · light_c, with Δ (T, 3) changes of coefficients; levels (L,),
-    gram (L, 3, T, T), light (L, 3, T), rest (L, 3).
-    """
-
-    levels: F64
-    gram: F64
-    light: F64
-    rest: F64
-
-    @classmethod
-    def of(cls, rows: Rows, nodes: list[Node], region: int, at: Sequence[Between]) -> Moments:
-        """At levels between nodes."""
-        width = max(node.columns.terms.shape[2] for node in nodes)
-        share = np.array([one.share for one in at])
-        first, second = [one.first for one in at], [one.second for one in at]
-        every = np.zeros((len(nodes), len(rows), width, 3))
-        for node, into in zip(nodes, every, strict=True):
-            into[:, : node.columns.terms.shape[2]] = node.columns.terms[:, region]
-        whole = np.stack([node.columns.whole[:, region] for node in nodes])
-        by = share[:, None, None, None]
-        terms = (1 - by) * every[first] + by * every[second]
-        sent = (1 - by[..., 0]) * whole[first] + by[..., 0] * whole[second]
-        importance, wanted = rows.importance, rows.change - (sent - whole[0])
-        weighed = (importance[:, None] * terms).transpose(0, 3, 2, 1)  # (L, 3, T, P)
-        gram = weighed @ terms.transpose(0, 3, 1, 2)
-        light = (weighed @ wanted.transpose(0, 2, 1)[..., None])[..., 0]
-        return cls(np.array([one.level for one in at]), gram, light, (importance * wanted**2).sum(axis=1))
-
-    def left(self, changes: F64) -> F64:
-        """(L, N, 3) of changes (N, T, 3) of coefficients."""
-        width = min(changes.shape[1], self.gram.shape[2])
-        by = changes[:, :width].transpose(2, 0, 1)  # (3, N, T)
-        square = ((by @ self.gram[:, :, :width, :width]) * by).sum(axis=3)
-        linear = (by @ self.light[:, :, :width, None])[..., 0]
-        return np.asarray((self.rest[..., None] + square - 2 * linear).transpose(0, 2, 1))
 
 
 class Between(NamedTuple):
@@ -106,38 +49,148 @@ class Between(NamedTuple):
 NOW = (Between(-1.0, 0, 0, 0.0),)
 
 
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """One region's change: its meaning (`strokes.stroke.MEANINGS`), the look it starts from, values by role;
+    what it leaves of the wanted change (squared, relative), and the score, lower is better; `at` which level.
+    """
+
+    region: int
+    meaning: str
+    look: Look
+    values: Mapping[str, F64]
+    left: float
+    score: float
+    at: Between = NOW[0]
+
+    @property
+    def explained(self) -> float:
+        """1 − left."""
+        return 1 - self.left
+
+    def predicted(self, nodes: list[Node]) -> list[F64]:
+        """(P, 3) by each set of rays: how columns say that light changes."""
+        values = {role: value[None] for role, value in self.values.items() if role != GLOSS}
+        made = []
+        for number in range(len(nodes[0].sides)):
+            terms, sent = _between_nodes([node.sides[number] for node in nodes], self.region, [self.at])
+            light = sent[0]
+            if values:
+                change = self.look.coefficients(values)[0] - self.look.plain
+                width = min(len(change), terms.shape[2])
+                light = light + np.einsum("ptc,tc->pc", terms[0, :, :width], change[:width])
+            made.append(light)
+        return made
+
+
+@dataclass(frozen=True, eq=False)
+class Moments:
+    """Of one region at L levels, relative to the region as it is.
+
+    left = rest + Σ_c Δ_cᵀ gram_c Δ_c − 2 Δ_c · light_c, with Δ (T, 3) changes of coefficients; levels (L,),
+    gram (L, 3, T, T), light (L, 3, T), rest (L, 3). From products of two sets of rays, whose noise is not
+    the same, it is without bias, and may come out below 0; of one set, the noise of its rays is in it.
+    """
+
+    levels: F64
+    gram: F64
+    light: F64
+    rest: F64
+
+    @classmethod
+    def of(
+        cls, rows: Rows, nodes: list[Node], region: int, at: Sequence[Between], off: Sequence[F64] = ()
+    ) -> Moments:
+        """At levels between nodes; `off` (P, 3) for each set of rays is what columns do not know of."""
+        importance = rows.importance
+        sides = []
+        for number in range(len(nodes[0].sides)):
+            terms, sent = _between_nodes([node.sides[number] for node in nodes], region, at)
+            known = rows.change - off[number] if off else rows.change
+            sides.append((terms, known - sent))  # (L, P, T, 3), (L, P, 3)
+        grams, lights, rests = [], [], []
+        pairs = itertools.permutations(sides, 2) if len(sides) > 1 else [(sides[0], sides[0])]
+        for (terms, wanted), (other, wish) in pairs:
+            weighed = (importance[:, None] * terms).transpose(0, 3, 2, 1)  # (L, 3, T, P)
+            grams.append(weighed @ other.transpose(0, 3, 1, 2))
+            lights.append((weighed @ wish.transpose(0, 2, 1)[..., None])[..., 0])
+            rests.append((importance * wanted * wish).sum(axis=1))
+        levels = np.array([one.level for one in at])
+        return cls(levels, *(np.mean(values, axis=0) for values in (grams, lights, rests)))
+
+    def left(self, changes: F64) -> F64:
+        """(L, N, 3) of changes (N, T, 3) of coefficients."""
+        width = min(changes.shape[1], self.gram.shape[2])
+        by = changes[:, :width].transpose(2, 0, 1)  # (3, N, T)
+        square = ((by @ self.gram[:, :, :width, :width]) * by).sum(axis=3)
+        linear = (by @ self.light[:, :, :width, None])[..., 0]
+        return np.asarray((self.rest[..., None] + square - 2 * linear).transpose(0, 2, 1))
+
+
+def _between_nodes(sides: Sequence[Columns], region: int, at: Sequence[Between]) -> tuple[F64, F64]:
+    """Of one region at levels between nodes: columns (L, P, T, 3), and what it sends more than now."""
+    width = max(one.terms.shape[2] for one in sides)
+    every = np.zeros((len(sides), len(sides[0].terms), width, 3))
+    for one, into in zip(sides, every, strict=True):
+        into[:, : one.terms.shape[2]] = one.terms[:, region]
+    whole = np.stack([one.whole[:, region] for one in sides])
+    first, second = [one.first for one in at], [one.second for one in at]
+    by = np.array([one.share for one in at])[:, None, None, None]
+    terms = (1 - by) * every[first] + by * every[second]
+    sent = (1 - by[..., 0]) * whole[first] + by[..., 0] * whole[second] - whole[0]
+    return terms, sent
+
+
 def candidates(
     rows: Rows, nodes: list[Node], regions: list[Region], allowed: frozenset[str]
 ) -> list[Candidate]:
     """The best change of each kind of each region, best first; `allowed` meanings."""
     made: list[Candidate] = []
     for number, region in enumerate(regions):
-        own = Moments.of(rows, nodes[:1], number, NOW)
-        found = [*_colours(number, region, own)]
-        if SPECULAR in region.now.roles:
-            found += _shine(number, region.now, own)
-        if GLOSS in region.full.roles and len(nodes) > 1:
-            found += _glosses(number, region, rows, nodes)
+        found = _of_region(number, region, rows, nodes)
         made += _best_of_each(one for one in found if one.meaning in allowed)
     return sorted(made, key=lambda one: one.score)
 
 
-def _glosses(number: int, region: Region, rows: Rows, nodes: list[Node]) -> Iterator[Candidate]:
+def fitted_again(
+    one: Candidate, made: Sequence[F64], rows: Rows, nodes: list[Node], region: Region
+) -> Candidate:
+    """A candidate whose change was carried forward, made (P, 3) for each set of rays, in place of columns."""
+    off = [then - now for then, now in zip(made, one.predicted(nodes), strict=True)]
+    found = [
+        found for found in _of_region(one.region, region, rows, nodes, off) if found.meaning == one.meaning
+    ]
+    return min(found, key=lambda one: one.score)
+
+
+def _of_region(
+    number: int, region: Region, rows: Rows, nodes: list[Node], off: Sequence[F64] = ()
+) -> Iterator[Candidate]:
+    own = Moments.of(rows, nodes[:1], number, NOW, off)
+    yield from _colours(number, region, own)
+    if SPECULAR in region.now.roles:
+        yield from _shine(number, region.now, own, NOW)
+    if GLOSS in region.full.roles and len(nodes) > 1:
+        yield from _glosses(number, region, rows, nodes, off)
+
+
+def _glosses(
+    number: int, region: Region, rows: Rows, nodes: list[Node], off: Sequence[F64]
+) -> Iterator[Candidate]:
     """Changes to levels other than today's, if the region shines at all today."""
     full, at = region.full, _between(region, nodes)
     if not at:
         return
-    levels = Moments.of(rows, nodes, number, at)
+    levels = Moments.of(rows, nodes, number, at, off)
     if region.full is region.now and full.shiny:
         left = _loosely(full, levels)
         best = int(np.argmin(left))
         level = float(levels.levels[best])
         score = score_of(float(left[best]), 1, abs(level - full.level) / LEVELS)
-        yield Candidate(
-            number, "gloss", full, {GLOSS: np.asarray(full.gloss_at(level))}, float(left[best]), score
-        )
+        values = {GLOSS: np.asarray(full.gloss_at(level))}
+        yield Candidate(number, "gloss", full, values, float(left[best]), score, at[best])
     if SPECULAR in full.roles:
-        yield from _shine(number, full, levels)
+        yield from _shine(number, full, levels, at)
 
 
 def _between(region: Region, nodes: list[Node]) -> list[Between]:
@@ -196,7 +249,7 @@ def _loosely(look: Look, levels: Moments) -> F64:
     return np.asarray(np.minimum(mid + slope * at + bend * at**2, left.min(axis=1)))
 
 
-def _shine(number: int, look: Look, levels: Moments) -> Iterator[Candidate]:
+def _shine(number: int, look: Look, levels: Moments, between: Sequence[Between]) -> Iterator[Candidate]:
     """More or less shine: of its own colour or white, of any colour; another level is one number more."""
     info, now = look.infos[look.roles[SPECULAR]], look.at(SPECULAR)
     grid = info.low + (info.high - info.low) * np.linspace(0, 1, STEPS) ** 2
@@ -211,7 +264,9 @@ def _shine(number: int, look: Look, levels: Moments) -> Iterator[Candidate]:
         at = float(levels.levels[level])
         gloss = {GLOSS: np.asarray(look.gloss_at(at))} if other else {}
         score = score_of(rest, numbers + other, _size(value, now))
-        return Candidate(number, meaning, look, {SPECULAR: value, **gloss}, rest, score)
+        score += TWO if meaning == "shine and gloss" else 0.0
+        values = {SPECULAR: value, **gloss}
+        return Candidate(number, meaning, look, values, rest, score, between[level])
 
     if now.ndim == 0:
         found = left(grid).sum(axis=2)
@@ -247,4 +302,4 @@ def _size(value: F64, now: F64) -> float:
     return float(np.sqrt(np.mean((value - now) ** 2)))
 
 
-__all__ = ["Candidate", "Moments", "candidates", "score_of"]
+__all__ = ["Candidate", "Moments", "candidates", "fitted_again", "score_of"]

@@ -102,7 +102,11 @@ class Look:
 
     def shape_at(self, level: float) -> F32:
         """What the model's kernel reads at a gloss level."""
-        values: dict[str, Value] = {**self.resolved.values, self.roles[GLOSS]: self.gloss_at(level)}
+        return self.shape_of(self.gloss_at(level))
+
+    def shape_of(self, gloss: float) -> F32:
+        """What it reads at a gloss."""
+        values: dict[str, Value] = {**self.resolved.values, self.roles[GLOSS]: gloss}
         return finite_shape(self.resolved.brdf, values)
 
     @property

@@ -22,7 +22,6 @@ from studio_core.scene.world_mesh import WorldMesh
 from studio_core.shading.artifacts import Surfaces
 from studio_core.strokes.marks import Marks
 from studio_core.strokes.stroke import FIXATE, Stroke
-from studio_plugins.slf.samples import DARK
 
 F32 = npt.NDArray[np.float32]
 F64 = npt.NDArray[np.float64]
@@ -31,6 +30,8 @@ Bools = npt.NDArray[np.bool_]
 
 MOST = 256
 """Rows of one stroke: of more, some stand for their neighbours."""
+DARK = 1.0
+"""Of the mean light, beside a row's own, to which its change is relative: what arrives changes everywhere."""
 POOLS = 48
 """Means of neighbouring rows that are told apart in a stroke."""
 BESIDE, FAINT = 0.6, 0.1
@@ -39,7 +40,6 @@ NEAR = 8  # vertices among which a mark looks for one that faces its way
 FACING = 0.3
 LIGHT = 1e30
 """More is none: tables of marks have large numbers where there are none."""
-NOBODY = np.zeros(0, np.int64)
 NOBODY = np.zeros(0, np.int64)
 
 
@@ -75,7 +75,7 @@ class Rows:
     def importance(self) -> F64:
         """(P, 3) weights of squared differences: Σ importance · change² is 1.
 
-        Relative to each row's own light, so that what is dark counts as much as what is bright.
+        Relative to each row's own light and the mean: dark rows count more, but not alone.
         """
         floor = DARK * self.light.mean() if self.light.size else 0.0
         made = self.weight[:, None] / np.maximum(self.light + floor, 1e-30) ** 2

@@ -9,6 +9,8 @@ is carried for a few groups of rows; in a group, what comes from far differs lit
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import numpy.typing as npt
 
@@ -73,13 +75,13 @@ class Importance:
     """
 
     def __init__(
-        self, known: Exchange, surfaces: Surfaces, sight: Sight, rows: Rows, job: Job | None
+        self, known: Exchange, surfaces: Surfaces, sights: Sequence[Sight], rows: Rows, job: Job | None
     ) -> None:
         group, self._share = groups_of(rows, surfaces.mesh)
         count, surface = len(known.surface.row), known.surface
         many = int(group.max(initial=-1)) + 1
         size = np.bincount(group, minlength=many)
-        total = sight.weight.sum(axis=1, dtype=np.float64)
+        total = np.mean([sight.weight.sum(axis=1, dtype=np.float64) for sight in sights], axis=0)
         mean = np.stack([np.bincount(group, total[:, c], many) / size for c in range(3)], axis=1)
         self._ratio = total[:, None] / np.maximum(mean, 1e-30)  # (P, K, 3)
         self.albedos = term_albedos(surface.separated)
@@ -90,7 +92,9 @@ class Importance:
         bounces = MOST_BOUNCES if known.bounces is None else known.bounces
         irradiance = _irradiance(known, surfaces, reflects, rays, bounces, job)
         sent = np.zeros((count, many, 3), np.float32)
-        spread_first(sight.met, sight.weight, group, (1 / size).astype(np.float32), sent)
+        share = (1 / (size * len(sights))).astype(np.float32)
+        for sight in sights:
+            spread_first(sight.met, sight.weight, group, share, sent)
         self.matter = np.zeros_like(sent)
         for step in range(1, bounces):
             before, sent = sent, np.zeros_like(sent)
@@ -106,14 +110,13 @@ class Importance:
         made = np.einsum("vtc,vtc->vc", own, surface.coefficients[:, :width])
         return np.asarray(made, np.float32)
 
-    def add(self, to: Columns, region: I32, surface: Surface, albedos: F64) -> Columns:
-        """Columns with what comes by way of others; albedos (R, T) are of the rows of the surface."""
-        count = self.matter.shape[1]
-        terms, whole = np.zeros((count, *to.terms.shape[1:])), np.zeros((count, *to.whole.shape[1:]))
+    def of(self, region: I32, regions: int, surface: Surface, albedos: F64) -> Columns:
+        """Columns of what comes by way of others; albedos (R, T) are of the rows of the surface."""
+        count, width = self.matter.shape[1], surface.coefficients.shape[1]
+        terms, whole = np.zeros((count, regions, width, 3)), np.zeros((count, regions, 3))
         sum_regions(region, surface.row, albedos / np.pi, surface.coefficients, self.matter, terms, whole)
         share = self._share[..., None] * self._ratio
-        far, far_whole = np.einsum("pkc,kgtc->pgtc", share, terms), np.einsum("pkc,kgc->pgc", share, whole)
-        return Columns(to.terms + far, to.whole + far_whole)
+        return Columns(np.einsum("pkc,kgtc->pgtc", share, terms), np.einsum("pkc,kgc->pgc", share, whole))
 
 
 class _WithoutFunctions:

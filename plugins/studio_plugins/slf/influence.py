@@ -36,6 +36,8 @@ U32 = npt.NDArray[np.uint32]
 Bools = npt.NDArray[np.bool_]
 
 RAYS, LOBE_RAYS = 2048, 256
+SIDES = 2
+"""Sets of rays that know nothing of each other: what both say is no noise."""
 SEED, LOBE_SEED = 5000, 5100
 VARIANTS = 64
 CHUNK = 8
@@ -53,10 +55,6 @@ class Sight:
     weight: F32
     traced: int
 
-    def part(self, some: slice) -> Sight:
-        """Some of the rows."""
-        return Sight(self.met[some], self.cell[some], self.weight[some], self.traced)
-
     def hit(self, count: int) -> Bools:
         """(V,) which of the vertices is met at all."""
         found = np.zeros(count, np.bool_)
@@ -68,14 +66,42 @@ class Sights:
     """Keeps rays of the vertices that strokes were near to; owned by the compute thread."""
 
     def __init__(self, services: Services) -> None:
-        self._workers = services.workers
-        self._table = Transport(services.workers, cosine_pattern(RAYS, VARIANTS, SEED))
-        self._lobes = LobeTable(services.registry)
-        self._drawn: list[RayTransport] = []
+        lobes = LobeTable(services.registry)
+        self._sides = [_Side(services, lobes, number) for number in range(SIDES)]
 
     @property
     def nbytes(self) -> int:
         """Bytes of all that is kept."""
+        return sum(side.nbytes for side in self._sides)
+
+    def of(
+        self,
+        scene: Scene,
+        surfaces: Surfaces,
+        casters: Casters,
+        known: Exchange,
+        rows: Rows,
+        job: Job,
+        sides: int = SIDES,
+    ) -> tuple[Sight, ...]:
+        """What the rows see now, by each of so many sets of rays; only what is not known is traced."""
+        own = self._sides[:sides]
+        return tuple(side.of(scene, surfaces, casters, known, rows, job) for side in own)
+
+
+class _Side:
+    """One set of rays."""
+
+    def __init__(self, services: Services, lobes: LobeTable, number: int) -> None:
+        self._workers = services.workers
+        self._table = Transport(services.workers, cosine_pattern(RAYS, VARIANTS, SEED + number))
+        self._lobes = lobes
+        self._seed = LOBE_SEED + number
+        self._drawn: list[RayTransport] = []
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of what is kept."""
         return self._table.nbytes + sum(drawn.nbytes for drawn in self._drawn)
 
     def of(
@@ -105,7 +131,7 @@ class Sights:
                 self._drawn.append(RayTransport(self._workers, LOBE_RAYS))
             vertices = rows.vertex[own]
             directions = np.zeros((len(own), LOBE_RAYS, 3), np.float32)
-            numbers = spread_numbers(VARIANTS, shapes.width, LOBE_RAYS, LOBE_SEED)
+            numbers = spread_numbers(VARIANTS, shapes.width, LOBE_RAYS, self._seed)
             draw_lobes(
                 0, len(own), vertices, variants_of(vertices, VARIANTS), mesh.positions, mesh.normals,
                 mesh.tangents, row, eyes[number].astype(np.float32), shapes.offset, shapes.data,
@@ -213,6 +239,10 @@ class Columns:
     terms: F64
     whole: F64
 
+    def plus(self, other: Columns) -> Columns:
+        """Both."""
+        return Columns(self.terms + other.terms, self.whole + other.whole)
+
 
 def columns(
     sight: Sight, region: I32, regions: int, received: Light, surface: Surface, services: Services, job: Job
@@ -279,11 +309,19 @@ def add_columns(
             if source >= 0:
                 its = count[r]
                 at = base[r] + np.int64(cell[p, j]) * its
-                for k in range(its):
-                    share, t = outgoing[at + k], term[first[r] + k]
-                    sums[t, 0] += share * received[source + k, 0]
-                    sums[t, 1] += share * received[source + k, 1]
-                    sums[t, 2] += share * received[source + k, 2]
+                k = np.int64(0)
+                while k < its:  # functions of a term lie together
+                    t = term[first[r] + k]
+                    red, green, blue = np.float32(0.0), np.float32(0.0), np.float32(0.0)
+                    while k < its and term[first[r] + k] == t:
+                        share = outgoing[at + k]
+                        red += share * received[source + k, 0]
+                        green += share * received[source + k, 1]
+                        blue += share * received[source + k, 2]
+                        k += 1
+                    sums[t, 0] += red
+                    sums[t, 1] += green
+                    sums[t, 2] += blue
             for t in range(width):
                 for c in range(3):
                     value = weight[p, j, c] * sums[t, c]

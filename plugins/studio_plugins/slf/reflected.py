@@ -8,6 +8,7 @@ is written.
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -20,15 +21,20 @@ from studio_core.scene.nodes import NodeId, Scene
 from studio_core.shading.job import Job
 from studio_core.strokes.solution import Finding, Lit, Reason
 from studio_core.strokes.stroke import AUTOMATIC, FIXATE, MEANINGS, Stroke
-from studio_plugins.slf.candidates import Candidate, candidates, score_of
+from studio_plugins.slf.candidates import Candidate, candidates, fitted_again, score_of
 from studio_plugins.slf.changeable import Region, regions_of
 from studio_plugins.slf.fixates import NOBODY, Rows, rows_of
-from studio_plugins.slf.influence import Sights
+from studio_plugins.slf.forward import Forward
+from studio_plugins.slf.influence import SIDES, Sights
 from studio_plugins.slf.joint import CLOSE
 from studio_plugins.slf.recolouring import edit_of
-from studio_plugins.slf.trials import Trials
+from studio_plugins.slf.trials import Node, Trials
 
 F64 = npt.NDArray[np.float64]
+NEARLY, CARRIED = 16.0, 4
+"""At rest candidates whose scores are that near to the best one's are carried forward; at most so many."""
+STRANGE = 2.0
+"""Times the light that is shown at a row: where the light of others is more, it says nothing."""
 SHOWN = 4
 """Objects that are told of."""
 
@@ -70,15 +76,29 @@ class Reflected:
         rows = rows_of(asked, surfaces, NOBODY if covered is None else covered.vertices, now)
         if not len(rows) or not (rows.importance * rows.change**2).sum() > 0:
             return Reflections(notes=("The stroke wants no change of what is reflected.",))
-        sight = self._sights.of(scene, surfaces, lit.casters, known, rows, job)
+        resting = lit.indirect is not None and lit.indirect.final
+        sights = self._sights.of(scene, surfaces, lit.casters, known, rows, job, SIDES if resting else 1)
         own = [(surfaces.nodes[i], s) for i, s in _under(rows, surfaces.mesh)]
         regions, region = regions_of(scene, surfaces, own, self._services.registry)
         if not regions:
             return Reflections(notes=("Nothing whose material could change lights the stroke.",))
-        nodes = self._trials(scene, surfaces, known, rows, sight, regions, region, job)
-        pooled, share = rows.pooled(surfaces.mesh.positions)
-        found = candidates(pooled, [node.pooled(share) for node in nodes], regions, allowed(asked))
-        counts = {"rows": len(rows), "regions": len(regions), "rays": sight.traced, "candidates": len(found)}
+        nodes = self._trials(scene, surfaces, known, rows, sights, regions, region, job)
+        pooled, share = _known(rows, nodes[0]).pooled(surfaces.mesh.positions)
+        means = [node.pooled(share) for node in nodes]
+        found = candidates(pooled, means, regions, allowed(asked))
+        near = [one for one in found if one.score - found[0].score < NEARLY][: CARRIED if resting else 0]
+        if near:
+            looks = self._trials.looks(scene, surfaces)
+            forward = Forward(known, surfaces, sights, self._trials.separator, self._services, job)
+            again = []
+            for one in near:
+                made = forward(one, regions[one.region], region == one.region, looks)
+                means_of = [share @ each for each in made]
+                again.append(fitted_again(one, means_of, pooled, means, regions[one.region]))
+            found = sorted([*again, *found[len(near) :]], key=lambda one: one.score)
+        traced = sum(sight.traced for sight in sights)
+        counts = {"rows": len(rows), "regions": len(regions), "rays": traced, "candidates": len(found)}
+        counts["carried"] = len(near)
         return Reflections(self._findings(scene, asked, regions, found), (), counts)
 
     def _findings(
@@ -106,6 +126,16 @@ class Reflected:
             values[name] = numbers[0] if len(numbers) == 1 else (numbers[0], numbers[1], numbers[2])
         edit = edit_of(scene, region, one.look, one.values)
         return Reason(one.meaning, one.explained, one.score, values, edit)
+
+
+def _known(rows: Rows, now: Node) -> Rows:
+    """Without weight where others are thought to give much more light than is shown there.
+
+    Such rows stand for what is buried in other things; being dark, they would count most of all.
+    """
+    arriving = np.mean([side.whole.sum(axis=(1, 2)) for side in now.sides], axis=0)
+    strange = arriving > STRANGE * rows.light.sum(axis=1)
+    return rows if strange.all() else dataclasses.replace(rows, weight=rows.weight * ~strange)
 
 
 def _under(rows: Rows, mesh: Any) -> set[tuple[int, int]]:

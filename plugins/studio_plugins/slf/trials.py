@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -30,18 +31,20 @@ TRIED = (3.0, 7.0, 11.0, 14.0, 16.0, 18.0)
 
 @dataclass(frozen=True, eq=False)
 class Node:
-    """Columns with all regions at one gloss level; level −1: as they are, in the models that they have."""
+    """Columns with all regions at one gloss level, by each set of rays; level −1: as they are, in the models
+    that they have.
+    """
 
     level: float
-    columns: Columns
+    sides: tuple[Columns, ...]
 
     def pooled(self, share: npt.NDArray[np.float64]) -> Node:
         """Means of the rows, by shares (K, P)."""
-        terms, whole = self.columns.terms, self.columns.whole
-        return Node(
-            self.level,
-            Columns(np.einsum("kp,pgtc->kgtc", share, terms), np.einsum("kp,pgc->kgc", share, whole)),
+        made = (
+            Columns(np.einsum("kp,pgtc->kgtc", share, one.terms), np.einsum("kp,pgc->kgc", share, one.whole))
+            for one in self.sides
         )
+        return Node(self.level, tuple(made))
 
 
 class Trials:
@@ -49,7 +52,7 @@ class Trials:
 
     def __init__(self, services: Services) -> None:
         self._services = services
-        self._separator = Separator()
+        self.separator = Separator()
         self._coefficients = VertexCoefficients(services)
 
     def __call__(
@@ -58,36 +61,41 @@ class Trials:
         surfaces: Surfaces,
         known: Exchange,
         rows: Rows,
-        sight: Sight,
+        sights: Sequence[Sight],
         regions: list[Region],
         region: I32,
         job: Job,
     ) -> list[Node]:
         """As they are, then at each of TRIED; where a region has no gloss its columns there are 0."""
         services, surface = self._services, known.surface
-        some = sight.hit(len(region)) & (region >= 0)
+        some = np.any([sight.hit(len(region)) for sight in sights], axis=0) & (region >= 0)
         arrivals = Arrivals(known, surfaces, some, services.workers, job)
-        importance = Importance(known, surfaces, sight, rows, job)
+        importance = Importance(known, surfaces, sights, rows, job)
         light, own = arrivals.weighed(known.shapes, surface.row, surface.separated, surface.coefficients)
-        first = columns(sight, region, len(regions), light, own, services, job)
-        nodes = [Node(-1.0, importance.add(first, region, surface, importance.albedos))]
+        far = importance.of(region, len(regions), surface, importance.albedos)
+        seen = (columns(sight, region, len(regions), light, own, services, job) for sight in sights)
+        nodes = [Node(-1.0, tuple(one.plus(far) for one in seen))]
         glossy = [number for number, one in enumerate(regions) if GLOSS in one.full.roles]
         if not glossy:
             return nodes
         shapes = _shapes(regions, glossy)
-        separated = self._separator(shapes, *known.separation, job)
+        separated = self.separator(shapes, *known.separation, job)
         albedos = term_albedos(separated)
-        other = {m: paintable(scene.material(m), services.registry) for m in surfaces.materials}
-        looks = self._coefficients(scene.with_materials(*other.values()), surfaces)
+        looks = self.looks(scene, surfaces)
         where = np.full(len(regions) + 1, -1, np.int32)
         where[glossy] = np.arange(len(glossy))
         for number, level in enumerate(TRIED):
             row = np.where(where[region] >= 0, where[region] * len(TRIED) + number, -1).astype(np.int32)
             light, tried = arrivals.weighed(shapes, row, separated, looks)
-            near = columns(sight, region, len(regions), light, tried, services, job)
-            everywhere = dataclasses.replace(tried, row=row)
-            nodes.append(Node(level, importance.add(near, region, everywhere, albedos)))
+            far = importance.of(region, len(regions), dataclasses.replace(tried, row=row), albedos)
+            seen = (columns(sight, region, len(regions), light, tried, services, job) for sight in sights)
+            nodes.append(Node(level, tuple(one.plus(far) for one in seen)))
         return nodes
+
+    def looks(self, scene: Scene, surfaces: Surfaces) -> F32:
+        """(V, T, 3) coefficients with every material in a model that has all roles, where there is one."""
+        other = [paintable(scene.material(name), self._services.registry) for name in surfaces.materials]
+        return self._coefficients(scene.with_materials(*other), surfaces)
 
 
 def _shapes(regions: list[Region], glossy: list[int]) -> Shapes:

@@ -25,10 +25,11 @@ from studio_plugins.slf.lumitexels import LightField
 from studio_plugins.slf.mixed import choose_all
 from studio_plugins.slf.moments import moments
 from studio_plugins.slf.paper import Solver
-from studio_plugins.slf.series import (, matte_of
+from studio_plugins.slf.series import (
     WIDTH,
     half_level,
     light_of,
+    matte_of,
     sent_of,
     series_of,
 )

@@ -42,14 +42,18 @@ def rows(painting: Painting) -> Rows:
 
 
 @pytest.fixture(scope="module")
-def sight(painting: Painting, rows: Rows) -> Sight:
+def sights(painting: Painting, rows: Rows) -> tuple[Sight, ...]:
     handed = painting.room.handed()
     known = painting.lit.sent
     return painting.solver._sights.of(painting.scene, handed[Surfaces], handed[Casters], known, rows, JOB)
 
 
-def seen(painting: Painting, sight: Sight, made: Any) -> Any:
-    """(P, 3) of what vertices send along the kept rays."""
+def seen(painting: Painting, sights: tuple[Sight, ...], made: Any) -> Any:
+    """(P, 3) of what vertices send along the kept rays, by all sets of these."""
+    return np.mean([_seen_along(painting, sight, made) for sight in sights], axis=0)
+
+
+def _seen_along(painting: Painting, sight: Sight, made: Any) -> Any:
     lit = sight.met < len(painting.mesh)
     light = np.zeros((*sight.met.shape, 3), np.float32)
     to = sight.met[lit].astype(np.int64), sight.cell[lit].astype(np.int64)
@@ -57,8 +61,10 @@ def seen(painting: Painting, sight: Sight, made: Any) -> Any:
     return (sight.weight * light).sum(axis=1, dtype=np.float64)
 
 
-def test_rays_of_rows_see_what_the_gather_shows(painting: Painting, rows: Rows, sight: Sight) -> None:
-    made = seen(painting, sight, painting.lit.sent)
+def test_rays_of_rows_see_what_the_gather_shows(
+    painting: Painting, rows: Rows, sights: tuple[Sight, ...]
+) -> None:
+    made = seen(painting, sights, painting.lit.sent)
     shown = painting.radiance(painting.lit, rows.vertex)
     np.testing.assert_allclose(made.mean(axis=0), shown.mean(axis=0), rtol=0.03)
 
@@ -74,29 +80,31 @@ def test_rays_of_rows_see_what_the_gather_shows(painting: Painting, rows: Rows, 
     ],
 )
 def test_columns_are_finite_differences(
-    painting: Painting, rows: Rows, sight: Sight, node: str, role: str, value: Any
+    painting: Painting, rows: Rows, sights: tuple[Sight, ...], node: str, role: str, value: Any
 ) -> None:
     registry, surfaces = painting.services.registry, painting.room.handed()[Surfaces]
     known = painting.lit.sent
-    before = seen(painting, sight, known)
+    before = seen(painting, sights, known)
     regions, region = regions_of(painting.scene, surfaces, [], registry)
     number = [one.node for one in regions].index(node)
     trials = painting.solver._trials
-    nodes = trials(painting.scene, surfaces, known, rows, sight, regions, region, JOB)
+    nodes = trials(painting.scene, surfaces, known, rows, sights, regions, region, JOB)
     look: Look = regions[number].now
     name = look.roles[role]
     then = painting.light(recoloured(painting.scene, node, **{name: value}))
-    wanted = seen(painting, sight, then.sent) - before
+    wanted = seen(painting, sights, then.sent) - before
     painting.become(painting.scene)
     if role == "gloss":
         level = float(level_of_alpha(look.resolved.brdf.alpha(value)))  # type: ignore[attr-defined]
-        sent = np.stack([one.columns.whole[:, number] for one in nodes[1:]])
+        whole = [np.mean([side.whole[:, number] for side in one.sides], axis=0) for one in nodes]
+        sent = np.stack(whole[1:])
         at = np.interp(level, TRIED, np.arange(len(TRIED)))
         low, share = int(at), at - int(at)
-        made = (1 - share) * sent[low] + share * sent[low + 1] - nodes[0].columns.whole[:, number]
+        made = (1 - share) * sent[low] + share * sent[low + 1] - whole[0]
     else:
         change = look.coefficients({role: np.array([value])})[0] - look.plain
-        made = np.einsum("ptc,tc->pc", nodes[0].columns.terms[:, number, : len(change)], change)
+        terms = np.mean([side.terms[:, number, : len(change)] for side in nodes[0].sides], axis=0)
+        made = np.einsum("ptc,tc->pc", terms, change)
     size = np.sqrt((wanted**2).mean())
     assert np.sqrt(((made - wanted) ** 2).mean()) < (0.3 if role == "gloss" else 0.15) * size
     if role != "gloss":
@@ -223,7 +231,7 @@ def test_groups_count_for_rows_near_them(painting: Painting, rows: Rows) -> None
     np.testing.assert_allclose(share.sum(axis=1), 1)
     assert (share.argmax(axis=1) == group).mean() > 0.8
     importance = Importance(
-        painting.lit.sent, painting.room.handed()[Surfaces], _nothing(rows, painting), rows, JOB
+        painting.lit.sent, painting.room.handed()[Surfaces], [_nothing(rows, painting)], rows, JOB
     )
     assert not importance.matter.any()
 

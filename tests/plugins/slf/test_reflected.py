@@ -72,6 +72,26 @@ def test_the_edit_changes_one_object_and_keeps_its_paint(painting: Painting) -> 
     np.testing.assert_allclose(added, (0.1, 0, 0), atol=1e-6)
 
 
+def test_at_rest_candidates_are_carried_forward(painting: Painting) -> None:
+    some = painting.vertices("floor", (-1.3, 0, 0), 80)
+    stroke = painting.stroke(some, wanted_from(painting, some, base_color=(0.2, 0.6, 0.9)))
+    in_hand = painting.solve(stroke)
+    assert in_hand.counts["carried"] == 0
+    before = painting.lit
+    painting.lit = dataclasses.replace(before, final=True)
+    at_rest = painting.solve(stroke)
+    painting.lit = before
+    assert at_rest.counts["carried"] >= 1
+    for found in (in_hand, at_rest):
+        assert (found.findings[0].node, found.findings[0].reasons[0].meaning) == ("side", "colour")
+    wanted = np.array((0.2, 0.6, 0.9))
+    off = [
+        np.abs(np.array(found.findings[0].reasons[0].values["base_color"]) - wanted).max()
+        for found in (in_hand, at_rest)
+    ]
+    assert max(off) < 0.08
+
+
 def test_a_model_that_cannot_shine_becomes_one_that_can(painting: Painting) -> None:
     some = painting.vertices("floor", (-1.3, 0, 0), 80)
     values = {"diffuse": (0.7, 0.6, 0.5), "specular": (0.8, 0.8, 0.8), "roughness": 0.35}
