@@ -62,8 +62,8 @@ def still_life() -> Scene:
     """Figure 16: a glossy bunny, a matte red ball and a brown ball that shines a little, by a lamp and a sky."""
     return _scene(
         [_matte("floor", (0.35, 0.36, 0.38)),
-         _shiny("porcelain", (0.14, 0.3, 0.24), (0.1, 0.1, 0.1), 0.32),
-         _shiny("red", (0.5, 0.03, 0.02), (0.0, 0.0, 0.0), 0.3),
+         _shiny("porcelain", (0.14, 0.3, 0.24), (0.12, 0.12, 0.12), 0.4),
+         _shiny("red", (0.5, 0.03, 0.02), (0.0, 0.0, 0.0), 0.25),
          _shiny("brown", (0.13, 0.08, 0.05), (0.04, 0.04, 0.04), 0.38)],
         _thing("floor", sheet((-4, 0, 4), (8, 0, 0), (0, 0, -8), (1, 1)), "floor"),
         _thing("bunny", _standing(star(60, 64, bunny), 0.4), "porcelain", at=_at(-0.62, -0.1, 25)),
@@ -77,13 +77,13 @@ def still_life() -> Scene:
 
 def corner(floor: Material | None = None) -> Scene:
     """Figures 17 and 18: a floor between walls of their own materials, and a box on it."""
-    walls = ("floor", "left", "right", "back", "ceiling", "ceiling")
-    grey = [_matte(name, (0.7, 0.7, 0.68)) for name in ("left", "right", "back", "ceiling")]
+    walls = ("floor", "left", "right", "back")
+    grey = [_matte(name, (0.7, 0.7, 0.68)) for name in walls[1:]]
     room = shell((-1.5, 0, -1.4), (1.5, 2.2, 1.4), 0.1, (1, 1, 1))
     return _scene(
         [*grey, floor or _matte("floor", (0.6, 0.58, 0.55)), _matte("box", (0.55, 0.45, 0.3))],
         _thing("floor", _slots(room, 0), "floor"),
-        *(_thing(name, _slots(room, slot), name) for slot, name in enumerate(walls[1:5], 1)),
+        *(_thing(name, _slots(room, slot), name) for slot, name in enumerate(walls[1:], 1)),
         _thing("box", box((-0.25, 0, -0.25), (0.25, 0.5, 0.25), (1, 1, 1)), "box", at=_at(0.2, -0.55, 30)),
         _lamp((0.5, 2.1, 0.5), (-0.9, 0.4, -0.2), 0.5, 50.0),
         _camera((0.0, 1.5, 3.7), (0.0, 0.75, 0.0), 40.0),
@@ -153,10 +153,10 @@ def furnished() -> Scene:
          _shiny("bunny", (0.3, 0.26, 0.2), (0.06, 0.06, 0.06), 0.35),
          _shiny("vase", (0.1, 0.18, 0.4), (0.08, 0.08, 0.08), 0.3),
          _matte("stool", (0.5, 0.4, 0.22))],
-        _thing("room", shell((-1.5, 0, -1.4), (1.5, 2.2, 1.4), 0.1, (12, 9, 12)), *names),
-        _thing("bunny", _standing(star(60, 64, bunny), 0.55), "bunny", at=_at(-0.45, 0.1, 20)),
-        _thing("vase", vase(40, 40, 0.75), "vase", at=_at(0.75, 0.35)),
-        _thing("stool", box((-0.3, 0, -0.3), (0.3, 0.42, 0.3), (6, 5, 6)), "stool", at=_at(0.45, -0.55, 30)),
+        _thing("room", shell((-1.5, 0, -1.4), (1.5, 2.2, 1.4), 0.1, (1, 1, 1)), *names),
+        _thing("bunny", _standing(star(40, 44, bunny), 0.55), "bunny", at=_at(-0.45, 0.1, 20)),
+        _thing("vase", vase(24, 28, 0.75), "vase", at=_at(0.75, 0.35)),
+        _thing("stool", box((-0.3, 0, -0.3), (0.3, 0.42, 0.3), (1, 1, 1)), "stool", at=_at(0.45, -0.55, 30)),
         _lamp((0.2, 2.1, 0.4), (0.1, 0, 0.1), 0.6, 50.0),
         _camera((0.0, 1.35, 3.6), (0.0, 0.75, 0.0), 40.0),
     )  # fmt: skip
@@ -260,7 +260,7 @@ def _tiles() -> Image:
 
 def _bumps() -> Image:
     v, u = (np.indices((64, 64)) + 0.5) / 64
-    across, up = 0.3 * np.cos(2 * np.pi * 2 * u), 0.3 * np.cos(2 * np.pi * 3 * v)
+    across, up = 0.12 * np.cos(2 * np.pi * 2 * u), 0.12 * np.cos(2 * np.pi * 3 * v)
     normals = np.stack([-across, -up, np.ones_like(across)], axis=2)
     normals /= np.linalg.norm(normals, axis=2, keepdims=True)
     return Image(((normals + 1) / 2).astype(np.float32), "data")

@@ -16,8 +16,7 @@ import numpy.typing as npt
 
 from studio.bench.harness import Report
 from studio.headless import Headless
-from studio_core.scene.nodes import Scene
-from studio_core.session import View
+from studio_core.scene.nodes import MeshObject, Scene
 from studio_core.shading.artifacts import Picture
 from studio_core.shading.frame import IndirectChoice
 from studio_core.shading.job import Job
@@ -31,9 +30,10 @@ from studio_core.strokes.tools import Seen, wanted
 F32 = npt.NDArray[np.float32]
 F64 = npt.NDArray[np.float64]
 
-SIZE, QUICK_SIZE = (400, 300), (96, 72)
-VERTICES, QUICK_VERTICES = 20_000, 2_000
-SOLVER, BACKEND = "joint", "reference"
+SIZE, QUICK_SIZE = (400, 300), (160, 120)
+QUALITY: Mapping[str, object] = {"vertices": 20_000, "pixel_lamps": True}
+QUICK_QUALITY: Mapping[str, object] = {**QUALITY, "vertices": 1500, "directions": "2048", "refine": False}
+SOLVER, BACKEND = "joint", "cuts"
 
 
 @dataclass(frozen=True)
@@ -88,6 +88,27 @@ class Played:
         """How far the mean light after an act is from what was wanted, of that."""
         return float(np.linalg.norm(self.after(act) - self.wish(act)) / np.linalg.norm(self.wish(act)))
 
+    def followed(self, act: int) -> float:
+        """How much of the change of mean light that was wanted has come; 1 is all of it."""
+        wish, made = self.wish(act) - self.before(act), self.after(act) - self.before(act)
+        return float(made @ wish / (wish @ wish))
+
+    def fixed(self, act: int) -> float:
+        """How much the light has changed where an act painted that it shall stay, of that."""
+        before, after = (one.linear for one in self.pictures[act])
+        still = (self.masks[act] > 0) & (self.wanted[act] == before).all(axis=2)
+        return float(np.abs(after - before)[still].mean() / before[still].mean())
+
+    def bare(self, node: str) -> float:
+        """1 where an object has no paint in the end."""
+        thing = self.scenes[-1][1][node]
+        assert isinstance(thing, MeshObject)
+        return float(thing.paint is None)
+
+    def painted(self) -> float:
+        """The share of all objects that have paint in the end."""
+        return float(np.mean([thing.paint is not None for thing in self.scenes[-1][1].of(MeshObject)]))
+
     def named(self, act: int, node: str, meaning: str) -> float:
         """1 where an act's first finding is of that object and that meaning."""
         found = self.findings[act]
@@ -106,14 +127,14 @@ def play(
     session: Session,
     program: Headless,
     size: tuple[int, int] = SIZE,
-    vertices: int = VERTICES,
+    quality: Mapping[str, object] = QUALITY,
 ) -> Played:
     """From the bare scene through all acts, by the doors that everybody has."""
     backend = program.registry.get("backend", BACKEND)
     choice: IndirectChoice | None = None
     if session.bounces:
         choice = indirect_choice(program.registry, "gather", {"bounces": session.bounces})
-    easel = Easel(backend, backend_params(backend, {"vertices": vertices}), program.services, choice)
+    easel = Easel(backend, backend_params(backend, quality), program.services, choice)
     bare, job = session.scene(), Job("Figure")
     view = Look(width=size[0], height=size[1]).view(bare)
     start = (bare, easel.picture(bare, view, job))
@@ -134,11 +155,11 @@ def run(report: Report, program: Headless) -> None:
     """All figures that are wanted."""
     from studio.bench.strokes_figure_sessions import FIGURES
 
-    size, vertices = (QUICK_SIZE, QUICK_VERTICES) if report.quick else (SIZE, VERTICES)
+    size, quality = (QUICK_SIZE, QUICK_QUALITY) if report.quick else (SIZE, QUALITY)
     for number, session in FIGURES.items():
         case = f"figure-{number}"
         if report.wants(case):
-            metrics = session.judge(play(session, program, size, vertices))
+            metrics = session.judge(play(session, program, size, quality))
             for metric, value in metrics.items():
                 report.add(case, metric, value, "1")
             report.add(case, "holds", float(not broken(session, metrics)), "1")
