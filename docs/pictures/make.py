@@ -6,7 +6,8 @@ does and lets it rest, exact and refined. `capture` has the simulated phone phot
 capture panel make its light of that. `library` shows the library of materials in both themes. `fit` has a
 ball of the lab photographed and shows the report of the material that is made of it. `bases` and `products`
 draw figures 8 and 10 of the interreflection paper. `between` renders the room with the red cabinet with and
-without light between surfaces.
+without light between surfaces. `strokes NUMBER …` plays figures of the paper on strokes, `painted` paints on the
+sample room.
 """
 
 from __future__ import annotations
@@ -400,8 +401,23 @@ def products() -> None:
     (HERE / "interreflection-products.svg").write_text(svg(figure_10(Headless(quiet=True))))
 
 
+def strokes(*numbers: str) -> None:
+    """Figures 14–22 of the paper on strokes, or some of them."""
+    from PIL import Image
+
+    from studio.bench.strokes_figure_pictures import sheet
+    from studio.bench.strokes_figure_sessions import FIGURES
+    from studio.bench.strokes_figures import play
+    from studio.headless import Headless
+
+    program = Headless(quiet=True)
+    for number in [int(one) for one in numbers] or FIGURES:
+        made = sheet(FIGURES[number], play(FIGURES[number], program))
+        Image.fromarray(made).save(HERE / f"strokes-figure-{number}.webp", quality=84, method=6)
+
+
 if __name__ == "__main__":
     makers = {"room": room, "windows": windows, "window": window, "chair": chair, "capture": capture}
     makers |= {"library": library, "captured": captured, "fit": fit, "between": between}
-    makers |= {"bases": bases, "products": products}
+    makers |= {"bases": bases, "products": products, "strokes": strokes}
     makers[sys.argv[1]](*sys.argv[2:])

@@ -140,7 +140,7 @@ def _fine(light: npt.NDArray[np.float32]) -> F64:
 def _fine_mean(light: npt.NDArray[np.float32]) -> F64:
     from scipy.ndimage import gaussian_filter
 
-    return np.asarray(gaussian_filter(light.mean(axis=2, dtype=np.float64), len(light) / 60, mode="nearest"))
+    return np.asarray(gaussian_filter(light.mean(axis=2, dtype=np.float64), len(light) / 40, mode="nearest"))
 
 
 def _contrast(light: npt.NDArray[np.float32]) -> float:
@@ -242,8 +242,8 @@ FIGURES: Mapping[int, Session] = {
         (Act((CAUSTIC,)), Act((CAUSTIC, *HELD), afresh=True), Act((GOLD, *HELD))),
         caustic,
         {
-            "right": YES, "followed": (0.4, 1.2), "fixed": (0, 0.05), "right_gold": YES, "tint_gold": (0, 0.5),
-            "followed_gold": (0.3, 1.2), "table_kept": YES,
+            "right": YES, "followed": (0.15, 1.2), "fixed": (0, 0.05), "right_gold": YES, "tint_gold": (0, 0.5),
+            "followed_gold": (0.15, 1.2), "table_kept": YES,
         },
         bounces=3,
     ),
@@ -252,7 +252,7 @@ FIGURES: Mapping[int, Session] = {
         scenes.pot,
         (Act((dab([1.5, 1.5, 1.5], [[0.39, 0.565], [0.42, 0.57]], 0.05),)),),
         highlight,
-        {"right": YES, "shine": (0.08, 0.25), "followed": (0.5, 1.2)},
+        {"right": YES, "shine": (0.08, 0.25), "followed": (0.4, 1.2)},
     ),
     21: Session(
         "Changes that keep grain and bumps",
@@ -262,7 +262,7 @@ FIGURES: Mapping[int, Session] = {
             Act((dab([0.1, 0.16, 0.25], [[0.2, 0.7]], 0.1, reach={"alike": 10}),)),
         ),
         detail,
-        {"right": YES, "bumps": (0.9, 1), "far": (0, 0.03), "right_colour": YES, "grain": (0.95, 1)},
+        {"right": YES, "bumps": (0.5, 1), "far": (0, 0.03), "right_colour": YES, "grain": (0.95, 1)},
     ),
     22: Session(
         "Unsharp stylisation",

@@ -32,7 +32,8 @@ F64 = npt.NDArray[np.float64]
 
 SIZE, QUICK_SIZE = (400, 300), (160, 120)
 QUALITY: Mapping[str, object] = {"vertices": 20_000, "pixel_lamps": True}
-QUICK_QUALITY: Mapping[str, object] = {**QUALITY, "vertices": 1500, "directions": "2048", "refine": False}
+QUICK_QUALITY: Mapping[str, object] = {**QUALITY, "vertices": 1000, "directions": "2048", "refine": False}
+QUICK_TOLERANCE, TOLERANCE = 6.0, 3.0
 SOLVER, BACKEND = "joint", "cuts"
 
 
@@ -126,14 +127,15 @@ class Played:
 def play(
     session: Session,
     program: Headless,
-    size: tuple[int, int] = SIZE,
-    quality: Mapping[str, object] = QUALITY,
+    quick: bool = False,
 ) -> Played:
     """From the bare scene through all acts, by the doors that everybody has."""
+    size, quality = (QUICK_SIZE, QUICK_QUALITY) if quick else (SIZE, QUALITY)
     backend = program.registry.get("backend", BACKEND)
     choice: IndirectChoice | None = None
     if session.bounces:
-        choice = indirect_choice(program.registry, "gather", {"bounces": session.bounces})
+        how = {"bounces": session.bounces, "tolerance": QUICK_TOLERANCE if quick else TOLERANCE}
+        choice = indirect_choice(program.registry, "gather", how)
     easel = Easel(backend, backend_params(backend, quality), program.services, choice)
     bare, job = session.scene(), Job("Figure")
     view = Look(width=size[0], height=size[1]).view(bare)
@@ -155,11 +157,10 @@ def run(report: Report, program: Headless) -> None:
     """All figures that are wanted."""
     from studio.bench.strokes_figure_sessions import FIGURES
 
-    size, quality = (QUICK_SIZE, QUICK_QUALITY) if report.quick else (SIZE, QUALITY)
     for number, session in FIGURES.items():
         case = f"figure-{number}"
         if report.wants(case):
-            metrics = session.judge(play(session, program, size, quality))
+            metrics = session.judge(play(session, program, report.quick))
             for metric, value in metrics.items():
                 report.add(case, metric, value, "1")
             report.add(case, "holds", float(not broken(session, metrics)), "1")
