@@ -128,9 +128,10 @@ def play(
     session: Session,
     program: Headless,
     quick: bool = False,
+    size: tuple[int, int] = SIZE,
 ) -> Played:
     """From the bare scene through all acts, by the doors that everybody has."""
-    size, quality = (QUICK_SIZE, QUICK_QUALITY) if quick else (SIZE, QUALITY)
+    size, quality = (QUICK_SIZE, QUICK_QUALITY) if quick else (size, QUALITY)
     backend = program.registry.get("backend", BACKEND)
     choice: IndirectChoice | None = None
     if session.bounces:

@@ -34,8 +34,9 @@ STEEPEST = 20.0
 
 @dataclass(frozen=True, eq=False)
 class Settling:
-    """One stroke on a picture: from where that is seen, how much each pixel counts (H, W), the mean light (3,)
-    that is wanted there, what there `was` last, and what was `asked` for then.
+    """One stroke on a picture: from where that is seen, how much each pixel counts (H, W), the mean light
+    (3,) that is wanted there, what there `was` last, what was `asked` for then, and how steeply (3,) the
+    picture follows.
     """
 
     view: View
@@ -43,6 +44,7 @@ class Settling:
     goal: F64
     was: F64
     asked: F64
+    steep: F64
 
     @classmethod
     def of(cls, name: NodeId, view: View, shown: F32, mask: F32, wanted: F32) -> dict[NodeId, Settling]:
@@ -53,7 +55,7 @@ class Settling:
             return {}
         share /= share.sum()
         goal = _mean(share, np.nan_to_num(wanted))
-        return {name: cls(view, share, goal, _mean(share, shown), goal)}
+        return {name: cls(view, share, goal, _mean(share, shown), goal, np.ones(3))}
 
     def after(self, shown: F32) -> Settling:
         """With what is to be asked for, now that the last answer shows so."""
@@ -61,8 +63,9 @@ class Settling:
         step = np.log(self.asked / self.was)
         small = np.abs(step) < TOLD
         followed = np.log(now / self.was) / np.where(small, 1.0, step)
-        steep = np.clip(np.where(small, 1.0, followed), 1.0, STEEPEST)
-        return dataclasses.replace(self, was=now, asked=now * (self.goal / now) ** (1 / steep))
+        steep = np.where(small, self.steep, np.clip(followed, 1.0, STEEPEST))
+        asked = now * (self.goal / now) ** (1 / steep)
+        return dataclasses.replace(self, was=now, asked=asked, steep=steep)
 
 
 def asking(scene: Scene, wishes: Mapping[NodeId, Settling]) -> Scene:

@@ -63,41 +63,46 @@ class Canvas:
             if painting.changes or instead
         }
         scene = self.scene.with_materials(*materials.values())
-        field = Field(
-            [layer for region in self.found for layer in self._layers(scene, region, instead.get(region))]
-        )
+        layers: dict[tuple[NodeId, ...], list[Decided]] = {}
+        for region in self.found:
+            for strokes, layer in self._layers(scene, region, instead.get(region)):
+                layers.setdefault(strokes, []).extend(layer)
+        field = Field([*layers.values()])
         made = self.spread(scene, self.surfaces, field) if field.layers else {}
         others = {node for stroke in scene.of(Stroke) if not stroke.hidden for node in stroke.objects}
         paints: dict[NodeId, Paint | None] = dict.fromkeys(self.whose)
         for node, paint in made.items():
             if node in paints or node not in others:
                 paints[node] = paint
-        strokes: dict[NodeId, dict[str, Any]] = {}
+        fields: dict[NodeId, dict[str, Any]] = {}
         for painting in self.found.values():
             for stroke_id, offsets in painting.offsets.items():
-                values = strokes.setdefault(stroke_id, {})
+                values = fields.setdefault(stroke_id, {})
                 table = values.get("table", getattr(scene[stroke_id], "table", None))
                 values["table"] = _with_offsets(table, offsets)
         for stroke in self._strokes():
             beyond = (node for node, paint in paints.items() if paint is not None and node not in others)
             reached = tuple(beyond) if stroke.alike else ()
             if reached != stroke.reached:
-                strokes.setdefault(stroke.id, {})["reached"] = reached
+                fields.setdefault(stroke.id, {})["reached"] = reached
         for stroke_id, meaning in meanings.items():
-            strokes.setdefault(stroke_id, {})["meaning"] = meaning
+            fields.setdefault(stroke_id, {})["meaning"] = meaning
         for node, own in paints.items():
             for slot in np.unique(own.slots).tolist() if own is not None else ():
                 material = Region(node, int(slot)).material(scene)
                 if material is not None:
                     materials[material] = paintable(scene.material(material), self.services.registry)
         changed = tuple(new for name, new in materials.items() if new is not self.scene.material(name))
-        return Solved(label, frozen_map(paints), changed, frozen_map(strokes))
+        return Solved(label, frozen_map(paints), changed, frozen_map(fields))
 
     def _strokes(self) -> list[Stroke]:
         steps = [step for painting in self.found.values() for step in painting.steps]
         return [*{stroke.id: stroke for step in steps for stroke in step.strokes}.values()]
 
-    def _layers(self, scene: Scene, region: Region, last: Explanation | None) -> Iterator[Layer]:
+    def _layers(
+        self, scene: Scene, region: Region, last: Explanation | None
+    ) -> Iterator[tuple[tuple[NodeId, ...], Layer]]:
+        """With the strokes that each is of: on several regions they say one thing, and it meets itself."""
         painting = self.found[region]
         part = self.surfaces.unrefined.mesh.index_of(region.node) * SLOTS + region.slot
         for step in painting.steps:
@@ -110,7 +115,7 @@ class Canvas:
                 if stroke.tool != FIXATE and len(own):
                     layer.append(Decided(own, Reach.of(stroke), changes))
             if layer:
-                yield layer
+                yield tuple(stroke.id for stroke in step.strokes if stroke.tool != FIXATE), layer
 
 
 def _with_offsets(table: Any, offsets: Sequence[tuple[npt.NDArray[np.int64], F64]]) -> Any:
