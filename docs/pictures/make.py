@@ -6,8 +6,8 @@ does and lets it rest, exact and refined. `capture` has the simulated phone phot
 capture panel make its light of that. `library` shows the library of materials in both themes. `fit` has a
 ball of the lab photographed and shows the report of the material that is made of it. `bases` and `products`
 draw figures 8 and 10 of the interreflection paper. `between` renders the room with the red cabinet with and
-without light between surfaces. `strokes NUMBER …` plays figures of the paper on strokes, `painted` paints on the
-sample room.
+without light between surfaces. `strokes NUMBER …` plays figures of the
+paper on strokes, `painted` paints on the sample room.
 """
 
 from __future__ import annotations

@@ -16,6 +16,7 @@ PARTS = (
     ("studio.bench.strokes_recovery", "run"),
     ("studio.bench.strokes_size", "run"),
     ("studio.bench.strokes_spread", "upsampling"),
+    ("studio.bench.strokes_figures", "run"),
 )
 
 

@@ -7,10 +7,22 @@ the backend is asked to.
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Callable
 
 import numpy as np
+import numpy.typing as npt
 
-from studio.bench.interreflection_meshes import box, bunny, one_slot, revolved, sheet, shell, star, teapot, vase
+from studio.bench.interreflection_meshes import (
+    box,
+    bunny,
+    merged,
+    one_slot,
+    sheet,
+    shell,
+    star,
+    teapot,
+    vase,
+)
 from studio_core.arrays import frozen_map
 from studio_core.params import Colour, Value
 from studio_core.scene.geometry import Geometry, Image, Texture
@@ -26,8 +38,8 @@ from studio_core.scene.nodes import (
 )
 from studio_core.scene.transform import Transform, axis_angle, looking
 
+F64 = npt.NDArray[np.float64]
 Point = tuple[float, float, float]
-GREY: Colour = (0.55, 0.55, 0.55)
 TEXELS = 256
 
 
@@ -35,9 +47,10 @@ def shadow() -> Scene:
     """Figure 14: a table's shadow on a floor between a white and a red wall, under one lamp."""
     names = ("floor", "left", "wall", "wall", "wall", "wall")
     legs = [box((x, 0, z), (x + 0.05, 0.6, z + 0.05), (1, 1, 1)) for x in (-0.5, 0.45) for z in (-0.4, 0.35)]
-    table = one_slot(_joined(box((-0.55, 0.6, -0.45), (0.55, 0.65, 0.45), (1, 1, 1)), *legs))
+    table = one_slot(merged(box((-0.55, 0.6, -0.45), (0.55, 0.65, 0.45), (1, 1, 1)), *legs))
     return _scene(
-        [_matte("floor", (0.5, 0.48, 0.45)), _matte("left", (0.6, 0.1, 0.07)), _matte("wall", (0.75, 0.74, 0.7)),
+        [_matte("floor", (0.5, 0.48, 0.45)),
+         _matte("left", (0.6, 0.1, 0.07)), _matte("wall", (0.75, 0.74, 0.7)),
          _matte("wood", (0.45, 0.3, 0.18))],
         _thing("room", shell((-1.5, 0, -1.4), (1.5, 2.2, 1.4), 0.1, (1, 1, 1)), *names),
         _thing("table", table, "wood", at=Transform((-0.35, 0, 0.05), axis_angle((0, 1, 0), 15))),
@@ -59,7 +72,7 @@ def closed() -> Scene:
 
 
 def still_life() -> Scene:
-    """Figure 16: a glossy bunny, a matte red ball and a brown ball that shines a little, by a lamp and a sky."""
+    """Figure 16: a glossy bunny, a matte red ball and a brown ball that shines a little."""
     return _scene(
         [_matte("floor", (0.35, 0.36, 0.38)),
          _shiny("porcelain", (0.14, 0.3, 0.24), (0.12, 0.12, 0.12), 0.4),
@@ -98,7 +111,8 @@ def glossy_corner() -> Scene:
 def ring() -> Scene:
     """Figure 19: a blue ring of paint on a table in a corner, and a spot light into it."""
     return _scene(
-        [_matte(name, (0.7, 0.7, 0.7)) for name in ("table", "back", "side")] + [_matte("ring", (0.15, 0.2, 0.6))],
+        [*(_matte(name, (0.7, 0.7, 0.7)) for name in ("table", "back", "side")),
+         _matte("ring", (0.06, 0.09, 0.28))],
         _thing("table", sheet((-1.2, 0, 1.2), (2.4, 0, 0), (0, 0, -2.4), (1, 1)), "table"),
         _thing("back", sheet((-1.2, 0, -1.2), (2.4, 0, 0), (0, 1.6, 0), (1, 1)), "back"),
         _thing("side", sheet((-1.2, 0, 1.2), (0, 0, -2.4), (0, 1.6, 0), (1, 1)), "side"),
@@ -148,7 +162,8 @@ def furnished() -> Scene:
     """Figure 22: glossy and matte things in a coloured room."""
     names = ("floor", "left", "right", "wall", "wall", "wall")
     return _scene(
-        [_matte("floor", (0.45, 0.4, 0.34)), _matte("left", (0.5, 0.16, 0.1)), _matte("right", (0.16, 0.34, 0.2)),
+        [_matte("floor", (0.45, 0.4, 0.34)),
+         _matte("left", (0.5, 0.16, 0.1)), _matte("right", (0.16, 0.34, 0.2)),
          _matte("wall", (0.55, 0.54, 0.5)),
          _shiny("bunny", (0.3, 0.26, 0.2), (0.06, 0.06, 0.06), 0.35),
          _shiny("vase", (0.1, 0.18, 0.4), (0.08, 0.08, 0.08), 0.3),
@@ -162,7 +177,9 @@ def furnished() -> Scene:
     )  # fmt: skip
 
 
-def _scene(materials: list[Material], *nodes: MeshObject | AreaLamp | PointLamp | SpotLamp | Environment | Camera) -> Scene:
+def _scene(
+    materials: list[Material], *nodes: MeshObject | AreaLamp | PointLamp | SpotLamp | Environment | Camera
+) -> Scene:
     return Scene().with_materials(*materials).with_nodes(*nodes)
 
 
@@ -178,9 +195,7 @@ def _shiny(name: str, diffuse: Colour, specular: Colour, roughness: float) -> Ma
 
 def _thing(name: str, mesh: Geometry, *materials: str, at: Transform | None = None) -> MeshObject:
     place = at or Transform()
-    return MeshObject(
-        id=name, name=name.capitalize(), geometry=mesh, materials=materials, transform=place
-    )
+    return MeshObject(id=name, name=name.capitalize(), geometry=mesh, materials=materials, transform=place)
 
 
 def _lamp(eye: Point, target: Point, side: float, intensity: float) -> AreaLamp:
@@ -196,7 +211,7 @@ def _at(x: float, z: float, degrees: float = 0.0) -> Transform:
     return Transform((x, 0.0, z), axis_angle((0, 1, 0), degrees))
 
 
-def _round(radius: float):  # type: ignore[no-untyped-def]
+def _round(radius: float) -> Callable[[F64], F64]:
     return lambda directions: np.full(len(directions), radius)
 
 
@@ -204,12 +219,6 @@ def _standing(mesh: Geometry, scale: float) -> Geometry:
     placed = mesh.positions * np.float32(scale)
     placed[:, 1] -= placed[:, 1].min()
     return Geometry(placed, mesh.faces, mesh.normals)
-
-
-def _joined(*parts: Geometry) -> Geometry:
-    from studio.bench.interreflection_meshes import merged
-
-    return merged(*parts)
 
 
 def _slots(mesh: Geometry, slot: int) -> Geometry:

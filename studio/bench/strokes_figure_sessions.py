@@ -210,7 +210,8 @@ FIGURES: Mapping[int, Session] = {
             Act((dab([0.9, 0.7, 0.1], [[0.522, 0.5]], 0.07),)),
             Act((dab([0.5, 0.5, 0.5], [[0.735, 0.385]], 0.06),)),
             Act((
-                {"tool": "sharpen", "radius": 0.02, "amount": 0.8, "path": [[0.735, 0.385]], "brush": {"size": 0.2}},
+                {"tool": "sharpen", "radius": 0.02, "amount": 0.8, "path": [[0.735, 0.385]],
+                 "brush": {"size": 0.2}},
             )),
         ),
         shine,
@@ -242,8 +243,8 @@ FIGURES: Mapping[int, Session] = {
         (Act((CAUSTIC,)), Act((CAUSTIC, *HELD), afresh=True), Act((GOLD, *HELD))),
         caustic,
         {
-            "right": YES, "followed": (0.15, 1.2), "fixed": (0, 0.05), "right_gold": YES, "tint_gold": (0, 0.5),
-            "followed_gold": (0.15, 1.2), "table_kept": YES,
+            "right": YES, "followed": (0.15, 1.2), "fixed": (0, 0.08),
+            "right_gold": YES, "tint_gold": (0, 0.6), "followed_gold": (0.15, 1.2), "table_kept": YES,
         },
         bounces=3,
     ),

@@ -87,8 +87,9 @@ def paint_and_solve(
     """Strokes on pictures of the scene, explained together (but for those that are planned otherwise).
 
     With `one_by_one` each is painted on the picture that those before have made, and is a step of its own.
-    With several `rounds` strokes are explained again under the light that the last answer brings: a wall
-    also lights itself by way of others (the paper's figure 15). InputError and EditError for cameras and objects that the scene does not have; Cancelled.
+    With several `rounds` strokes are explained again under the light that the last answer brings (figure
+    15): see `settling`. InputError and EditError for cameras and objects that the scene does not have;
+    Cancelled.
     """
     job = job or Job("Painting")
     run = solver.open(services)

@@ -77,9 +77,7 @@ def asking(scene: Scene, wishes: Mapping[NodeId, Settling]) -> Scene:
         assert stroke.marks is not None
         told = (stroke.marks.wanted != stroke.marks.shown).any(axis=1, keepdims=True)
         scale = np.where(told, wish.asked / wish.goal, 1.0)
-        marks = dataclasses.replace(
-            stroke.marks, wanted=np.asarray(stroke.marks.wanted * scale, np.float32)
-        )
+        marks = dataclasses.replace(stroke.marks, wanted=np.asarray(stroke.marks.wanted * scale, np.float32))
         made.append(dataclasses.replace(stroke, table=marks.table()))
     return scene.with_nodes(*made)
 

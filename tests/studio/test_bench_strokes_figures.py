@@ -44,7 +44,9 @@ def test_a_figure_shows_what_was_painted_between_before_and_after(program):
     made = sheet(session, played)
     assert made.shape == (height, 3 * width + 2 * GAP, 3)
     under = played.masks[0] > 0.9
-    first, second, third = (made[:, x : x + width][under].mean() for x in (i * (width + GAP) for i in range(3)))
+    first, second, third = (
+        made[:, x : x + width][under].mean() for x in (i * (width + GAP) for i in range(3))
+    )
     assert second > third > first
 
 
