@@ -111,7 +111,7 @@ def highlight(played: Played) -> dict[str, float]:
 
 
 def detail(played: Played) -> dict[str, float]:
-    """Whether bumps show in the new shine as they did in the old, and grain in new colour; what is far away."""
+    """Whether bumps show in the new shine as in the old, and grain in new colour; what is far away."""
     (before, after), (other, then) = ([one.linear for one in pair] for pair in played.pictures)
     glow, far = _about(played.masks[0], 2.0), _edge(played.masks[0])
     tile = played.masks[1] > 0
