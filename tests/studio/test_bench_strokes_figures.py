@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+
 import numpy as np
 import pytest
 
@@ -21,10 +23,15 @@ def program(host, workers):
     return made
 
 
+@pytest.fixture(scope="module")
+def played(program):
+    return functools.cache(lambda number: play(FIGURES[number], program, quick=True))
+
+
 @pytest.mark.parametrize("number", FIGURES)
-def test_what_a_figure_claims_holds(number, program):
+def test_what_a_figure_claims_holds(number, played):
     session = FIGURES[number]
-    metrics = session.judge(play(session, program, quick=True))
+    metrics = session.judge(played(number))
     assert set(session.limits) == set(metrics)
     assert broken(session, metrics) == {}
 
@@ -37,13 +44,11 @@ def test_the_bench_plays_those_that_are_asked_for(program, monkeypatch):
     assert {row.metric for row in report.rows} == {*FIGURES[20].limits, "holds"}
 
 
-def test_a_figure_shows_what_was_painted_between_before_and_after(program):
-    session = FIGURES[20]
-    played = play(session, program, quick=True)
+def test_a_figure_shows_what_was_painted_between_before_and_after(played):
     width, height = QUICK_SIZE
-    made = sheet(session, played)
+    made = sheet(FIGURES[20], played(20))
     assert made.shape == (height, 3 * width + 2 * GAP, 3)
-    under = played.masks[0] > 0.9
+    under = played(20).masks[0] > 0.9
     first, second, third = (
         made[:, x : x + width][under].mean() for x in (i * (width + GAP) for i in range(3))
     )
