@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from studio_core.strokes.session import Painted
 
 USUAL = "joint"
+MOST_ROUNDS = 16
 
 
 def add_options(verb: argparse.ArgumentParser) -> None:
@@ -33,6 +34,8 @@ def add_options(verb: argparse.ArgumentParser) -> None:
     add_values(verb, "--solver-param", "the solver")
     text = "paint each stroke on the picture that those before have made, instead of all on one"
     verb.add_argument("--one-by-one", action="store_true", help=text)
+    text = "how often strokes are explained, each time under the light that the last answer brings"
+    verb.add_argument("--rounds", type=int, default=1, metavar="N", help=f"{text} (default: %(default)s)")
     verb.add_argument("--report", type=Path, metavar="JSON", help="what was found, and why")
 
 
@@ -48,6 +51,8 @@ def strokes(options: argparse.Namespace, program: Headless) -> None:
     check_target(out, (".lucarne",), "projects")
     if options.report is not None:
         check_target(options.report, (".json",), "reports")
+    if not 1 <= options.rounds <= MOST_ROUNDS:
+        raise InputError(f"--rounds: 1 to {MOST_ROUNDS}")
     backend, params = chosen_backend(options, program)
     choice = chosen_indirect(options, program)
     solver, solver_params = _chosen_solver(options, program)
@@ -58,7 +63,7 @@ def strokes(options: argparse.Namespace, program: Headless) -> None:
         started = time.perf_counter()
         with program.job("Painting") as job:
             given = (document.scene, planned, solver, solver_params, easel, services, job)
-            made = paint_and_solve(*given, one_by_one=options.one_by_one)
+            made = paint_and_solve(*given, one_by_one=options.one_by_one, rounds=options.rounds)
         seconds = time.perf_counter() - started
         for note in made.notes:
             program.say(note)

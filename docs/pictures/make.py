@@ -6,7 +6,8 @@ does and lets it rest, exact and refined. `capture` has the simulated phone phot
 capture panel make its light of that. `library` shows the library of materials in both themes. `fit` has a
 ball of the lab photographed and shows the report of the material that is made of it. `bases` and `products`
 draw figures 8 and 10 of the interreflection paper. `between` renders the room with the red cabinet with and
-without light between surfaces.
+without light between surfaces. `strokes NUMBER …` plays figures of the
+paper on strokes, `painted` paints on the sample room.
 """
 
 from __future__ import annotations
@@ -43,6 +44,11 @@ SETTLED = 180  # seconds that a window may take to come to rest
 PHONE_AT = (0.7, 1.3, 0.6)  # where the phone is held in the sample room, metres
 FACE, PANEL = 512, (1280, 800)  # pixels of a side of the room's cube, and of the capture panel
 LIBRARY = (430, 760)
+PAINTED = (
+    {"colour": [0.2, 0.045, 0.035], "shading": True, "path": [[0.63, 0.42], [0.642, 0.436]],
+     "brush": {"size": 0.09}, "reach": {"alike": 20}},
+    {"colour": [0.55, 0.52, 0.5], "path": [[0.55, 0.595], [0.56, 0.6]], "brush": {"size": 0.03}},
+)  # fmt: skip
 STEPS_SHOWN = ("reflections", "join")
 
 
@@ -400,8 +406,40 @@ def products() -> None:
     (HERE / "interreflection-products.svg").write_text(svg(figure_10(Headless(quiet=True))))
 
 
+def strokes(*numbers: str) -> None:
+    """Figures 14–22 of the paper on strokes, or some of them."""
+    from PIL import Image
+
+    from studio.bench.strokes_figure_pictures import sheet
+    from studio.bench.strokes_figure_sessions import FIGURES
+    from studio.bench.strokes_figures import play
+    from studio.headless import Headless
+
+    program = Headless(quiet=True)
+    for number in [int(one) for one in numbers] or FIGURES:
+        made = sheet(FIGURES[number], play(FIGURES[number], program))
+        Image.fromarray(made).save(HERE / f"strokes-figure-{number}.webp", quality=84, method=6)
+
+
+def painted() -> None:
+    """The sample room, two strokes, and what becomes of it."""
+    from PIL import Image
+
+    from studio.bench.strokes_figure_pictures import sheet
+    from studio.bench.strokes_figures import Act, Session, play
+    from studio.headless import Headless
+    from studio.samples import sample
+    from studio.verbs import open_scene
+
+    session = Session(
+        "The sample room", lambda: open_scene(sample()), (Act(tuple(PAINTED)),), lambda played: {}, {}
+    )
+    made = sheet(session, play(session, Headless(quiet=True), size=HALF))
+    Image.fromarray(made).save(HERE / "painted-room.webp", quality=86, method=6)
+
+
 if __name__ == "__main__":
     makers = {"room": room, "windows": windows, "window": window, "chair": chair, "capture": capture}
     makers |= {"library": library, "captured": captured, "fit": fit, "between": between}
-    makers |= {"bases": bases, "products": products}
+    makers |= {"bases": bases, "products": products, "strokes": strokes, "painted": painted}
     makers[sys.argv[1]](*sys.argv[2:])

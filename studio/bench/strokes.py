@@ -19,6 +19,7 @@ PARTS = (
     ("studio.bench.strokes_size", "run"),
     ("studio.bench.strokes_spread", "upsampling"),
     ("studio.bench.strokes_direct", "direct"),
+    ("studio.bench.strokes_figures", "run"),
 )
 
 

@@ -84,18 +84,19 @@ class Stroking(ABC):
         look = Look(width=width, height=height, standing=self._session.view)
         if camera is not None:
             look = Look(self._camera(camera).id, width=width, height=height)
-        return self._paint([PaintedStroke(tool, along, chosen, look, fields)], solver, False)
+        return self._paint([PaintedStroke(tool, along, chosen, look, fields)], solver)
 
     def paint_strokes(
-        self, path: str | Path, solver: str = "joint", one_by_one: bool = False
+        self, path: str | Path, solver: str = "joint", one_by_one: bool = False, rounds: int = 1
     ) -> tuple[Finding, ...]:
         """Paint the strokes of a JSON file (docs/strokes.md); materials follow.
 
-        All on one picture and explained together, or each on what those before have made. What was found.
+        All on one picture and explained together, or each on what those before have made; in several
+        `rounds`, each under the light that the last answer brings. What was found.
         """
         from studio_core.strokes.files import strokes_from_file
 
-        return self._paint(strokes_from_file(Path(path)), solver, one_by_one)
+        return self._paint(strokes_from_file(Path(path)), solver, one_by_one, rounds)
 
     def stylise(self, amount: float = 1.0, solver: str = "joint") -> None:
         """Paint all objects so that the scene's light is sharpened, or with a negative amount smoothed."""
@@ -123,7 +124,9 @@ class Stroking(ABC):
         backend = registry.get("backend", session.backend)
         return backend, backend_params(backend, session.params), session_choice(session, registry)
 
-    def _paint(self, planned: Sequence[Planned], solver: str, one_by_one: bool) -> tuple[Finding, ...]:
+    def _paint(
+        self, planned: Sequence[Planned], solver: str, one_by_one: bool = False, rounds: int = 1
+    ) -> tuple[Finding, ...]:
         from studio_core.strokes.session import KIND, Easel, Painted, paint_and_solve
 
         scene, services = self.scene, self._services()
@@ -132,7 +135,7 @@ class Stroking(ABC):
             chosen, (backend, params, choice) = self._registry.get(KIND, solver), self._shaded_by()
             easel = Easel(backend, params, services, choice)
             given = (scene, planned, chosen, chosen.Params(), easel, services, job)
-            return paint_and_solve(*given, one_by_one=one_by_one)
+            return paint_and_solve(*given, one_by_one=one_by_one, rounds=rounds)
 
         made: Painted = self._run("Painting", work)
         for edit in made.edits:

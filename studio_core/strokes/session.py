@@ -10,11 +10,11 @@ from typing import Any
 
 from studio_core.arrays import frozen_map
 from studio_core.contract import Services, ShadingBackend, StrokeRun, StrokeSolver
-from studio_core.edits import Add, Edit
+from studio_core.edits import Add, Compound, Edit
 from studio_core.errors import InputError
 from studio_core.raster import PictureStage
 from studio_core.scene.diff import Aspect, Changes, diff, view_changed
-from studio_core.scene.nodes import MeshObject, Scene, new_id
+from studio_core.scene.nodes import MeshObject, NodeId, Scene, new_id
 from studio_core.session import View
 from studio_core.shading.artifacts import Picture
 from studio_core.shading.frame import Frame, IndirectChoice
@@ -23,8 +23,9 @@ from studio_core.shading.job import Job
 from studio_core.shading.pipeline import Pipeline
 from studio_core.strokes.edits import applied
 from studio_core.strokes.lit import lit_of
-from studio_core.strokes.painting import Marked, marks_of, stroke_name, stroke_of
-from studio_core.strokes.planned import Look, MarkedStroke, PaintedStroke, Planned
+from studio_core.strokes.painting import marks_of, stroke_name, stroke_of
+from studio_core.strokes.planned import Look, MarkedStroke, Planned
+from studio_core.strokes.settling import Settling, as_found, as_painted, asking
 from studio_core.strokes.solution import Finding, Lit
 from studio_core.strokes.stroke import Stroke
 from studio_core.strokes.tools import Seen, wanted
@@ -81,18 +82,21 @@ def paint_and_solve(
     job: Job | None = None,
     *,
     one_by_one: bool = False,
+    rounds: int = 1,
 ) -> Painted:
     """Strokes on pictures of the scene, explained together (but for those that are planned otherwise).
 
     With `one_by_one` each is painted on the picture that those before have made, and is a step of its own.
-    InputError and EditError for cameras and objects that the scene does not have; Cancelled.
+    With several `rounds` strokes are explained again under the light that the last answer brings (figure
+    15): see `settling`. InputError and EditError for cameras and objects that the scene does not have;
+    Cancelled.
     """
     job = job or Job("Painting")
     run = solver.open(services)
     made = Painted(scene, (), (), (), ())
     groups = [[one] for one in planned] if one_by_one else [[*planned]]
     for group in groups:
-        made = _group(made, group, run, params, easel, job, apart=one_by_one)
+        made = _group(made, group, run, params, easel, job, one_by_one, rounds)
     return made
 
 
@@ -104,10 +108,12 @@ def _group(
     easel: Easel,
     job: Job,
     apart: bool,
+    rounds: int,
 ) -> Painted:
     """With some strokes more, painted on what there was before."""
     scene, strokes, notes = before.scene, list[Stroke](), [*before.notes]
     pictures: dict[View, Picture] = {}
+    wishes: dict[NodeId, Settling] = {}
     for one in planned:
         job.checkpoint()
         fields = {"together": bool(strokes) and not apart, **one.fields}
@@ -117,19 +123,31 @@ def _group(
         view = one.look.view(scene)
         if view not in pictures:
             pictures[view] = easel.picture(scene, view, job)
-        marked = _painted(one, pictures[view])
+        shown = pictures[view]
+        seen = Seen.of(shown)
+        mask = one.gesture.mask(seen)
+        wish = wanted(one.tool, seen, one.gesture, one.settings, mask)
+        marked = marks_of(shown, mask, wish)
         stroke = stroke_of(marked, scene, one.tool, **fields)
         notes += [*one.notes, *(f"{stroke.name}: {note}" for note in marked.notes)]
         if stroke.marks is not None:
             strokes.append(stroke)
+            wishes |= Settling.of(stroke.id, view, shown.linear, mask, wish)
     if not strokes:
         return dataclasses.replace(before, notes=tuple(notes))
     if not pictures:
         easel.picture(scene, Look().view(scene), job)
     label = strokes[0].name if len(strokes) == 1 else f"Paint {len(strokes)} strokes"
-    there = Add(tuple(strokes))(scene)
-    solution = run.solve(there, [stroke.id for stroke in strokes], easel.lit(), params, job)
+    there, asked = Add(tuple(strokes))(scene), [stroke.id for stroke in strokes]
+    solution = run.solve(there, asked, easel.lit(), params, job)
     edit = applied(label, strokes, solution)
+    kept = as_painted(label, edit(scene), strokes)
+    for _ in range(1, 1 if any(stroke.indirect for stroke in strokes) else rounds):
+        now = edit(scene)
+        lit = {view: easel.picture(now, view, job).linear for view in pictures or (Look().view(scene),)}
+        wishes = {name: one.after(lit[one.view]) for name, one in wishes.items()}
+        solution = run.solve(asking(as_found(now, solution), wishes), asked, easel.lit(), params, job)
+        edit = Compound(label, (*edit.edits, solution.edit, kept))
     return Painted(
         edit(scene),
         (*before.edits, edit),
@@ -138,12 +156,6 @@ def _group(
         (*notes, *solution.notes),
         frozen_map(Counter(before.counts) + Counter(solution.counts)),
     )
-
-
-def _painted(planned: PaintedStroke, shown: Picture) -> Marked:
-    seen = Seen.of(shown)
-    mask = planned.gesture.mask(seen)
-    return marks_of(shown, mask, wanted(planned.tool, seen, planned.gesture, planned.settings, mask))
 
 
 def _marked(scene: Scene, planned: MarkedStroke, fields: Mapping[str, Any]) -> Stroke:

@@ -200,6 +200,23 @@ def test_a_flat_colour_is_a_single_change(artist):
     assert all(" and " not in reason.meaning for reason in solution.findings[0].reasons)
 
 
+def test_a_stroke_over_things_that_are_alike_changes_them_once(artist):
+    def pair(values):
+        left = dataclasses.replace(room()["ball"], transform=Transform((-0.55, 0.5, 0)))
+        right = dataclasses.replace(left, id="other", transform=Transform((0.55, 0.5, 0)))
+        return room(values).with_nodes(left, right)
+
+    before, then = pair(LOOK), pair({**LOOK, "diffuse": (0.2, 0.4, 0.6)})
+    shown, wanted = (artist.picture(scene)[0] for scene in (before, then))
+    mask = np.isin(shown.node, [shown.nodes.index(name) for name in ("ball", "other")]).astype(np.float32)
+    stroke = stroke_of(marks_of(shown, mask, wanted.linear), before, "replace", alike=20.0)
+    assert set(stroke.objects) == {"ball", "other"}
+    solution, there = artist.solve(before, stroke)
+    after = solution.edit(there)
+    for name in stroke.objects:
+        np.testing.assert_allclose(after[name].paint.change("diffuse")[0], [-0.3, 0.1, 0.4], atol=0.03)
+
+
 def test_what_says_nothing_changes_nothing(artist):
     before = room()
     stroke = artist.stroke(before, changed(diffuse=(0.2, 0.4, 0.6)))

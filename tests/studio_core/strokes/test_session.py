@@ -82,6 +82,20 @@ def test_one_by_one_each_is_painted_on_what_those_before_have_made(services, eas
     assert len(solver.runs) == 1, "one run remembers what surfaces see of each other"
 
 
+def test_rounds_ask_again_and_strokes_keep_what_they_say(services, easel):
+    before, solver = scene(), MeanSolver()
+    planned = [plan(ON_CUBE, stops=0.5)]
+    made = paint_and_solve(before, planned, solver, Params(), easel, services, rounds=3)
+    assert len(solver.runs[0].asked) == 3
+    assert len(made.edits) == 1
+    (stroke,) = made.scene.of(Stroke)
+    assert np.array_equal(stroke.marks.wanted, made.strokes[0].marks.wanted)
+    assert stroke.meaning == "automatic"
+    far = [plan(ON_CUBE, fields={"indirect": True}, stops=0.5)]
+    paint_and_solve(before, far, solver, Params(), easel, services, rounds=3)
+    assert len(solver.runs[1].asked) == 1, "what is reflected answers for all bounces already"
+
+
 def test_solvers_get_rows_of_meshes_that_are_not_refined(services):
     base = scene()
     rough = Texture(Image(np.random.default_rng(1).random((8, 8, 1), np.float32)))
