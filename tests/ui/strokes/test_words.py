@@ -44,9 +44,9 @@ def test_things_are_called_by_their_groups() -> None:
 def test_a_finding_is_a_sentence() -> None:
     finding = Finding("seat", 0, ("s",), (reason("shine", shine=0.35),))
     change = changed({"shine": 0.04}, {"shine": "Shine"}, finding.reasons[0])
-    told = sentence(room(), finding, finding.reasons[0], change)
+    told = sentence(place(room(), "seat"), finding.reasons[0], change)
     assert told == "Chair · Seat: shine 0.04 → 0.35, explains 93 % of the stroke"
-    assert sentence(room(), finding, reason(""), "") == "Chair · Seat: nothing needs to change"
+    assert sentence("Chair · Seat", reason(""), "") == "Chair · Seat: nothing needs to change"
     assert silence(finding) == ""
     assert (
         silence(Finding("seat", 0, (), (), silent=("shine", "gloss")))
@@ -62,7 +62,7 @@ def test_what_changes_most_is_told_first_and_what_stays_not_at_all() -> None:
 
 @given(st.floats(-10, 10))
 def test_shares_are_shares(explained: float) -> None:
-    told = sentence(room(), Finding("seat", 0, (), ()), reason("shine", explained), "")
+    told = sentence("Seat", reason("shine", explained), "")
     assert 0 <= int(told.split("explains ")[1].split(" %")[0]) <= 100
 
 

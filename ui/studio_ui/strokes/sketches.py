@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from PySide6.QtCore import QObject, QTimer
 
 from studio_core.errors import EditError
-from studio_core.scene.diff import Changes, diff, view_changed
+from studio_core.scene.diff import Aspect, Changes, diff, view_changed
 from studio_core.scene.nodes import NodeId, Scene
 from studio_core.scene.transform import looking
 from studio_core.session import Session, View
@@ -24,9 +25,10 @@ from studio_ui.feed import Freshness
 from studio_ui.tasks import Task
 
 WIDTH, HEIGHT = 112, 84
-_ROOM = 2.2  # times the stroke's size, that is seen
+_ROOM = 1.8  # times the stroke's size, that is seen
 _LEAST, _MOST = 6.0, 60.0  # degrees
 _WAIT_MS = 150
+_KEPT = 12  # pictures
 
 
 class Sketches(QObject):
@@ -39,6 +41,7 @@ class Sketches(QObject):
         self._before: Frame | None = None
         self._waiting: list[tuple[Scene, NodeId, Reason, Callable[[Picture], object]]] = []
         self._task: Task | None = None
+        self._kept: dict[int, _Kept] = {}  # by id of the reason, the newest last
         self._soon = QTimer(self)
         self._soon.setSingleShot(True)
         self._soon.timeout.connect(self._next)
@@ -63,7 +66,15 @@ class Sketches(QObject):
             self._task.job.cancel()
 
     def want(self, scene: Scene, stroke: NodeId, reason: Reason, done: Callable[[Picture], object]) -> None:
-        """A picture of the scene as a reason would make it, of the place of a stroke."""
+        """A picture of the scene as a reason would make it, of the place of a stroke.
+
+        One that was made of that reason is given at once; another follows if it is out of date.
+        """
+        kept = self._kept.get(id(reason))
+        if kept is not None:
+            done(kept.picture)
+            if kept.shows(scene, around(scene, stroke, self._context.session.view)):
+                return
         self._waiting.append((scene, stroke, reason, done))
         self._follow()
 
@@ -83,19 +94,20 @@ class Sketches(QObject):
             return
         frame = self._context.feed.frame(scene, view)
 
-        def work(job: Job) -> Picture | None:
+        def work(job: Job) -> _Kept | None:
             try:
                 other = reason.edit(scene)
             except EditError:  # the scene has changed too much since
                 return None
-            return self._shade(dataclasses.replace(frame, scene=other), job)
+            return _Kept(reason, other, view, self._shade(dataclasses.replace(frame, scene=other), job))
 
-        def ended(found: Picture | None) -> None:
+        def ended(found: _Kept | None) -> None:
             self._task = None
             if wish in self._waiting and (found is not None or not cancelled()):
                 self._waiting.remove(wish)
             if found is not None:
-                done(found)
+                self._kept = dict([*self._kept.items(), (id(reason), found)][-_KEPT:])
+                done(found.picture)
             self._follow()
 
         def cancelled() -> bool:
@@ -121,6 +133,24 @@ class Sketches(QObject):
         self._before = frame
         made: Picture = self._pipeline.update(frame, changes, job)
         return made
+
+
+@dataclass(frozen=True, eq=False)
+class _Kept:
+    """A picture, the reason it is of, and what it shows from where."""
+
+    reason: Reason
+    scene: Scene
+    view: View
+    picture: Picture
+
+    def shows(self, scene: Scene, view: View | None) -> bool:
+        """Whether it would look the same again."""
+        try:
+            changes = diff(self.scene, self.reason.edit(scene))
+        except EditError:
+            return False
+        return view == self.view and not changes.aspects & ~Aspect.NAME
 
 
 def around(scene: Scene, stroke: NodeId, view: View) -> View | None:
