@@ -24,7 +24,7 @@ from studio_ui.context import Context, Subscriptions
 from studio_ui.feed import Freshness
 from studio_ui.tasks import Task
 
-WIDTH, HEIGHT = 112, 84
+WIDTH, HEIGHT = 132, 96
 _ROOM = 1.8  # times the stroke's size, that is seen
 _LEAST, _MOST = 6.0, 60.0  # degrees
 _WAIT_MS = 150
