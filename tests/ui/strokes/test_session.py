@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from painting_support import PLUGIN, Rule, lit_room, studio_of
+from painting_support import PLUGIN, Rule, brush_in_hand, controls, desk, studio_of
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtWidgets import QLabel, QToolButton
 from pytestqt.qtbot import QtBot
@@ -21,8 +21,6 @@ from studio_core.scene.paint import Paint
 from studio_core.strokes.stroke import GLOSS, Stroke
 from studio_plugins.slf import plugin as slf
 from studio_ui.canvas.viewport import Pointer
-from studio_ui.strokes.controls import StrokeControls
-from studio_ui.strokes.desk import StrokeDesk
 from studio_ui.strokes.sketches import HEIGHT, WIDTH
 
 ALT, CTRL, SHIFT = (
@@ -44,29 +42,6 @@ def rule(monkeypatch: pytest.MonkeyPatch) -> Rule:
 def painter(rule: Rule, qtbot: QtBot, tmp_path: Path) -> Iterator[Driver]:
     """A window with the brush in the hand."""
     yield from brush_in_hand(studio_of(tmp_path / "state", qtbot, PLUGIN))
-
-
-def brush_in_hand(driver: Driver) -> Iterator[Driver]:
-    """Over a lit room, until the test is over."""
-    try:
-        driver.show(lit_room())
-        driver.until(lambda: driver.context.warm)
-        driver.do("tool.stroke")
-        yield driver
-    finally:
-        driver.close()
-
-
-def desk(driver: Driver) -> StrokeDesk:
-    return driver.window.strokes.desk()
-
-
-def controls(driver: Driver) -> StrokeControls:
-    """The panel's inside, when it tells what is now."""
-    found = driver.window.panels["strokes"].controls
-    assert found is not None
-    driver.until(lambda: not found.soon.isActive())
-    return found
 
 
 def strokes(driver: Driver) -> list[Stroke]:

@@ -32,11 +32,11 @@ _KEPT = 12  # pictures
 
 
 class Sketches(QObject):
-    """One at a time, while the picture is up to date; whatever is asked of the pictures stops it."""
+    """One at a time, while the picture is up to date and `free()`; whatever is asked of pictures stops it."""
 
-    def __init__(self, context: Context) -> None:
+    def __init__(self, context: Context, free: Callable[[], bool] = lambda: True) -> None:
         super().__init__()
-        self._context = context
+        self._context, self._free = context, free
         self._pipeline: Any = None
         self._before: Frame | None = None
         self._waiting: list[tuple[Scene, NodeId, Reason, Callable[[Picture], object]]] = []
@@ -46,7 +46,7 @@ class Sketches(QObject):
         self._soon.setSingleShot(True)
         self._soon.timeout.connect(self._next)
         self._subscriptions = Subscriptions()
-        self._subscriptions.add(context.feed.freshness.connect(lambda _: self._follow()))
+        self._subscriptions.add(context.feed.freshness.connect(lambda _: self.follow()))
 
     @property
     def session(self) -> Session:
@@ -76,16 +76,19 @@ class Sketches(QObject):
             if kept.shows(scene, around(scene, stroke, self._context.session.view)):
                 return
         self._waiting.append((scene, stroke, reason, done))
-        self._follow()
+        self.follow()
 
-    def _follow(self) -> None:
-        if self._context.feed.state is Freshness.CURRENT:
+    def follow(self) -> None:
+        """Begin, or make way for what comes first."""
+        free, state = self._free(), self._context.feed.state
+        if free and state is Freshness.CURRENT:
             self._soon.start(_WAIT_MS)
-        elif self._task is not None and self._context.feed.state is Freshness.STALE:
+        elif self._task is not None and (not free or state is Freshness.STALE):
             self._task.job.cancel()
 
     def _next(self) -> None:
-        if self._task is not None or not self._waiting or self._context.feed.state is not Freshness.CURRENT:
+        now = self._free() and self._context.feed.state is Freshness.CURRENT
+        if self._task is not None or not self._waiting or not now:
             return
         scene, stroke, reason, done = wish = self._waiting[0]
         view = around(scene, stroke, self._context.session.view)
@@ -108,7 +111,7 @@ class Sketches(QObject):
             if found is not None:
                 self._kept = dict([*self._kept.items(), (id(reason), found)][-_KEPT:])
                 done(found.picture)
-            self._follow()
+            self.follow()
 
         def cancelled() -> bool:
             return task.job.cancelled

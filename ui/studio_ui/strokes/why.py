@@ -41,6 +41,7 @@ class Why(QWidget):
         self.lines: list[QLabel] = []
         self.cards: list[QToolButton] = []
         self._host, self._sketches = host, sketches
+        self._shown: tuple[object, ...] = ()
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)
         column.setSpacing(GAP)
@@ -59,7 +60,10 @@ class Why(QWidget):
         self, scene: Scene, stroke: Stroke, findings: tuple[Finding, ...], solution: Solution
     ) -> None:
         """What a stroke of a scene was found to mean."""
+        if self._shown and all(a is b for a, b in zip(self._shown, (scene, stroke, solution), strict=True)):
+            return
         self._empty()
+        self._shown = (scene, stroke, solution)
         self.told.setVisible(not findings)
         self.told.setText("" if solution.notes else nothing_found(stroke))
         set_role(self.told, "dim")
@@ -86,6 +90,7 @@ class Why(QWidget):
 
     def _empty(self) -> None:
         self._sketches.forget()
+        self._shown = ()
         self.cards, self.lines = [], []
         self.told.show()
         while self._rest.count():
