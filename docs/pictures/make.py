@@ -6,7 +6,7 @@ does and lets it rest, exact and refined. `capture` has the simulated phone phot
 capture panel make its light of that. `library` shows the library of materials in both themes. `fit` has a
 ball of the lab photographed and shows the report of the material that is made of it. `bases` and `products`
 draw figures 8 and 10 of the interreflection paper. `between` renders the room with the red cabinet with and
-without light between surfaces.
+without light between surfaces. `strokes` paints on the sofa and shows why that is explained as it is.
 """
 
 from __future__ import annotations
@@ -382,6 +382,13 @@ def fit() -> None:
     studio.close()
 
 
+def strokes() -> None:
+    """The stroke panel after a stroke on the sofa in the colour of the armchair."""
+    from painted_sofa import photograph
+
+    photograph(HERE / "strokes.webp", WINDOW, 5 * SETTLED)
+
+
 def bases() -> None:
     """Figure 8 of the interreflection paper."""
     from studio.bench.interreflection_figures import figure_8
@@ -403,5 +410,5 @@ def products() -> None:
 if __name__ == "__main__":
     makers = {"room": room, "windows": windows, "window": window, "chair": chair, "capture": capture}
     makers |= {"library": library, "captured": captured, "fit": fit, "between": between}
-    makers |= {"bases": bases, "products": products}
+    makers |= {"bases": bases, "products": products, "strokes": strokes}
     makers[sys.argv[1]](*sys.argv[2:])

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from painting_support import PLUGIN, Rule, brush_in_hand, controls, desk, studio_of
 from PySide6.QtCore import QPoint, Qt
+from PySide6.QtGui import QPalette
 from PySide6.QtWidgets import QLabel, QToolButton
 from pytestqt.qtbot import QtBot
 from ui_support import Driver
@@ -65,8 +66,10 @@ def stool(driver: Driver) -> MeshObject:
 
 
 def has_picture(card: QToolButton) -> bool:
+    """Not the bare patch of before."""
     image = card.icon().pixmap(WIDTH, HEIGHT).toImage()
-    return image.pixelColor(image.width() // 2, image.height() // 2).alpha() > 0
+    bare = card.palette().color(QPalette.ColorRole.Base)
+    return image.pixelColor(image.width() // 2, image.height() // 2) != bare
 
 
 def same(one: Paint | None, other: Paint | None) -> bool:
@@ -181,12 +184,14 @@ def test_the_runner_up_is_a_click_away(painter: Driver) -> None:
     assert "Cannot tell from here: shine" in told
     assert "One other reason is nearly as good" in told
     first = stool(driver).paint
+    driver.until(lambda: all(has_picture(card) for card in why.cards))
     why.cards[1].click()
     assert driver.labels()[-1] == "Gloss of Stool"
     assert stool(driver).paint is not None
     assert "roughness" in stool(driver).paint.changes
     assert strokes(driver)[0].meaning == GLOSS
     assert [card.isChecked() for card in controls(driver).why.cards] == [False, True]
+    assert all(has_picture(card) for card in controls(driver).why.cards), "those of before"
     driver.do("edit.undo")
     assert stool(driver).paint is first
     assert [card.isChecked() for card in controls(driver).why.cards] == [True, False]

@@ -20,14 +20,14 @@ from PySide6.QtWidgets import (
 from studio_core.edits import Remove, SetFields
 from studio_core.errors import LucarneError
 from studio_core.params import Value, param_infos
-from studio_core.scene.diff import Changes
+from studio_core.scene.diff import Aspect, Changes
 from studio_core.scene.nodes import NodeId, Scene
 from studio_core.strokes.stroke import BLUR, BRIGHTEN, DARKEN, REPLACE, SHARPEN, SMEAR, Stroke
 from studio_ui.forms.fields import Combo
 from studio_ui.forms.param_form import ParamForm
 from studio_ui.forms.sinks import LiveSink
 from studio_ui.look.theme import GAP, Theme
-from studio_ui.panels.panel import Panel, heading, row
+from studio_ui.panels.panel import Panel, heading, note, row
 from studio_ui.strokes.bench import Order
 from studio_ui.strokes.brush_store import REACH, brush_infos
 from studio_ui.strokes.desk import StrokeDesk
@@ -71,6 +71,8 @@ class StrokeControls(QWidget):
         column = panel.column_of(self)
         column.addLayout(self._tool_buttons())
         column.addLayout(self._hand_buttons())
+        self.dark = note("Nothing lights anything else now: switch on Light between surfaces on the toolbar.")
+        column.addWidget(self.dark)
         self.brush = self._brush_form()
         column.addWidget(self.brush)
         self.across = QCheckBox("On whatever is under the brush")
@@ -113,6 +115,7 @@ class StrokeControls(QWidget):
             desk.changed.connect(self._later),
             self._context.document.changed.connect(self._edited),
             self._context.session.displayed.connect(self._show_brush),
+            self._context.session.changed.connect(self._lit_otherwise),
         )
         self._seen: QTimer | None = None
         self._show_brush()
@@ -151,11 +154,16 @@ class StrokeControls(QWidget):
         now = self._desk.store.now
         self.tools[now.tool].setChecked(True)
         self.hands[now.indirect].setChecked(True)
+        self.dark.setVisible(now.indirect and not self._context.session.bouncing)
         with QSignalBlocker(self.across):
             self.across.setChecked(now.across)
         for name in _SETTINGS:
             self.brush.show_row(name, name in _OF_TOOL.get(now.tool, ()))
         self.brush.show_values(self._desk.store.values())
+
+    def _lit_otherwise(self, aspect: Aspect) -> None:
+        if aspect & Aspect.INDIRECT:
+            self._show_brush()
 
     def paintEvent(self, event: QPaintEvent) -> None:
         """Solvers are asked for their names once somebody sees this: to ask loads them."""

@@ -53,6 +53,11 @@ class Sketches(QObject):
         """How pictures are shown."""
         return self._context.session
 
+    @property
+    def done(self) -> bool:
+        """Whether none is wanted."""
+        return self._task is None and not self._waiting
+
     def close(self) -> None:
         """Make no more."""
         self.forget()
@@ -95,7 +100,7 @@ class Sketches(QObject):
         if view is None:
             del self._waiting[0]
             return
-        frame = self._context.feed.frame(scene, view)
+        frame = self._context.feed.frame(scene, view, moving=True)  # as exact as in the hand
 
         def work(job: Job) -> _Kept | None:
             try:

@@ -29,6 +29,8 @@ from studio_ui.strokes.words import changed, explained, nothing_found, number, p
 _CARDS = 4
 """Reasons that are shown as pictures, the chosen one among them."""
 _COLUMNS = 2
+_NOTHING = 0.01
+"""Of a stroke: what explains no more than that is no reason."""
 
 
 class Why(QWidget):
@@ -64,8 +66,8 @@ class Why(QWidget):
             return
         self._empty()
         self._shown = (scene, stroke, solution)
-        self.told.setVisible(not findings)
-        self.told.setText("" if solution.notes else nothing_found(stroke))
+        self.told.setVisible(not findings and not solution.notes)
+        self.told.setText(nothing_found(stroke))
         set_role(self.told, "dim")
         for finding in findings:
             chosen = chosen_reason(stroke, finding)
@@ -77,7 +79,7 @@ class Why(QWidget):
             line.setToolTip(told)
             self.lines.append(line)
             self._rest.addWidget(line)
-            if chosen.meaning:
+            if chosen.meaning or finding.close:
                 self._add_cards(scene, stroke, finding)
             silent = silence(finding)
             if silent:
@@ -103,13 +105,14 @@ class Why(QWidget):
                 widget.deleteLater()
 
     def _add_cards(self, scene: Scene, stroke: Stroke, finding: Finding) -> None:
-        if len(finding.reasons) < 2:
+        current = chosen_reason(stroke, finding)
+        shown = worth_showing(finding, current)
+        if len(shown) < 2:
             return
         grid = QGridLayout()
         grid.setSpacing(GAP)
         self._rest.addLayout(grid)
-        current = chosen_reason(stroke, finding)
-        for at, reason in enumerate(finding.reasons[:_CARDS]):
+        for at, reason in enumerate(shown):
             card = self._card(scene, finding, reason, chosen=reason is current)
             grid.addWidget(card, at // _COLUMNS, at % _COLUMNS)
             self.cards.append(card)
@@ -180,6 +183,12 @@ def _line(text: str) -> QLabel:
     return made
 
 
+def worth_showing(finding: Finding, current: Reason) -> list[Reason]:
+    """Reasons that explain something, to change nothing, and the one that holds now."""
+    made = [r for r in finding.reasons if not r.meaning or r.explained > _NOTHING or r is current]
+    return made[:_CARDS]
+
+
 def chosen_reason(stroke: Stroke, finding: Finding) -> Reason:
     """The one that the stroke means now: what was taken, or the best."""
     return next(
@@ -192,4 +201,4 @@ def chosen_reason(stroke: Stroke, finding: Finding) -> Reason:
     )
 
 
-__all__ = ["Why", "chosen_reason", "swatch"]
+__all__ = ["Why", "chosen_reason", "swatch", "worth_showing"]
