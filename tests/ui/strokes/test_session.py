@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from names import nameless
 from painting_support import PLUGIN, Rule, brush_in_hand, controls, desk, studio_of
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtGui import QPalette
@@ -185,6 +186,8 @@ def test_the_runner_up_is_a_click_away(painter: Driver) -> None:
     assert "One other reason is nearly as good" in told
     first = stool(driver).paint
     driver.until(lambda: all(has_picture(card) for card in why.cards))
+    driver.do("stroke.stylise")
+    assert nameless(driver.window) == []
     why.cards[1].click()
     assert driver.labels()[-1] == "Gloss of Stool"
     assert stool(driver).paint is not None
