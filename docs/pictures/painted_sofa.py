@@ -16,7 +16,7 @@ def photograph(target: Path, size: tuple[int, int], patience: float) -> None:
     """A window of so many pixels, to a file; `patience` in seconds."""
     os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
     os.environ["LUCARNE_STATE"] = tempfile.mkdtemp(prefix="lucarne-pictures-")
-    from PySide6.QtCore import QPoint, Qt
+    from PySide6.QtCore import QPoint, QRect, Qt
     from PySide6.QtTest import QTest
     from PySide6.QtWidgets import QApplication
 
@@ -50,23 +50,25 @@ def photograph(target: Path, size: tuple[int, int], patience: float) -> None:
         studio.window.strokes.desk(),
         studio.window.stroke_panel,
     )
-    left, none = Qt.MouseButton.LeftButton, Qt.KeyboardModifier.NoModifier
+    button, none = Qt.MouseButton.LeftButton, Qt.KeyboardModifier.NoModifier
 
     def at(place: tuple[float, float]) -> QPoint:
         return QPoint(round(place[0] * canvas.width()), round(place[1] * canvas.height()))
 
-    QTest.mouseClick(canvas, left, Qt.KeyboardModifier.AltModifier, at(ARMCHAIR))
-    QTest.mousePress(canvas, left, none, at(SEAT[0]))
+    QTest.mouseClick(canvas, button, Qt.KeyboardModifier.AltModifier, at(ARMCHAIR))
+    QTest.mousePress(canvas, button, none, at(SEAT[0]))
     for place in SEAT[1:]:
         QTest.mouseMove(canvas, at(place))
-    QTest.mouseRelease(canvas, left, none, at(SEAT[-1]))
+    QTest.mouseRelease(canvas, button, none, at(SEAT[-1]))
     wait(
         lambda: (
             not desk.work.begun and rests() and panel.controls is not None and bool(panel.controls.why.cards)
         )
     )
     wait(lambda: desk.sketches.done)
-    if not studio.window.grab().save(str(target), "webp", 88):
+    left = canvas.mapTo(studio.window, QPoint(0, 0)).x()
+    seen = QRect(left, 0, studio.window.width() - left, studio.window.height())  # the picture and the panel
+    if not studio.window.grab(seen).save(str(target), "webp", 88):
         raise SystemExit("the picture cannot be written")
     studio.close()
 
