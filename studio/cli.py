@@ -16,7 +16,18 @@ from studio_core.errors import InputError, LucarneError
 
 VERBS = (
     *("demo", "new", "info", "copy", "compact", "render", "frames", "radiance", "precompute", "export"),
-    *("strokes", "capture", "fit-brdf", "fit-material", "materials", "script", "bench", "stress", "doctor"),
+    *(
+        "strokes",
+        "stylise",
+        "capture",
+        "fit-brdf",
+        "fit-material",
+        "materials",
+        "script",
+        "bench",
+        "stress",
+        "doctor",
+    ),
 )
 BAD_INPUT, OUR_FAULT, INTERRUPTED, NOBODY_READS = 2, 70, 130, 141
 TRACEBACK = "LUCARNE_TRACEBACK"
@@ -136,10 +147,10 @@ def _run(options: argparse.Namespace) -> int:
                 from studio import verbs_project
 
                 return getattr(verbs_project, options.verb)(options, program) or 0
-            if options.verb == "strokes":
-                from studio.verbs_strokes import strokes
+            if options.verb in ("strokes", "stylise"):
+                from studio import verbs_strokes
 
-                return strokes(options, program) or 0
+                return getattr(verbs_strokes, options.verb)(options, program) or 0
             if options.verb == "precompute":
                 from studio.verbs_precompute import precompute
 
@@ -311,6 +322,10 @@ def parser() -> argparse.ArgumentParser:
     verbs_strokes.add_options(strokes)
     _backend_options(strokes)
     indirect_options.add_options(strokes)
+    stylise = verb("stylise", "sharpen or smooth the light of a whole scene by its materials")
+    verbs_strokes.add_stylise_options(stylise)
+    _backend_options(stylise)
+    indirect_options.add_options(stylise)
     text = "a room's light from photographs of it, taken at several exposures"
     capture_options.add_options(verb("capture", text))
     text = "the values with which reflectance models come nearest to a measured material"

@@ -1,10 +1,14 @@
-"""`lucarne strokes`: light that is wanted, painted by a file, and the materials that explain it."""
+"""`lucarne strokes`: light that is wanted, painted by a file, and the materials that explain it.
+
+`lucarne stylise`: a scene whose light is sharpened, or smoothed, by its materials.
+"""
 
 from __future__ import annotations
 
 import argparse
 import json
 import time
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,6 +20,9 @@ from studio_core.errors import InputError
 
 if TYPE_CHECKING:
     from studio_core.contract import StrokeSolver
+    from studio_core.document import Document
+    from studio_core.edits import Edit
+    from studio_core.project.records import LoadedProject
     from studio_core.scene.nodes import Scene
     from studio_core.strokes.session import Painted
 
@@ -24,11 +31,10 @@ MOST_ROUNDS = 16
 
 
 def add_options(verb: argparse.ArgumentParser) -> None:
-    """All but those of backends and of light between surfaces."""
+    """All of `strokes` but those of backends and of light between surfaces."""
     verb.add_argument("project", type=Path, metavar="PROJECT")
     verb.add_argument("strokes", type=Path, metavar="STROKES.json", help="see docs/strokes.md")
-    text = "a project that is there is kept as OUT~"
-    verb.add_argument("-o", "--out", type=Path, required=True, metavar="OUT.lucarne", help=text)
+    _add_out(verb)
     text = "how materials are found: joint, mixed, l0 or l2 (default: %(default)s)"
     verb.add_argument("--solver", default=USUAL, metavar="ID", help=text)
     add_values(verb, "--solver-param", "the solver")
@@ -39,11 +45,27 @@ def add_options(verb: argparse.ArgumentParser) -> None:
     verb.add_argument("--report", type=Path, metavar="JSON", help="what was found, and why")
 
 
+def add_stylise_options(verb: argparse.ArgumentParser) -> None:
+    """All of `stylise` but those of backends and of light between surfaces."""
+    verb.add_argument("project", type=Path, metavar="PROJECT")
+    _add_out(verb)
+    text = "how much stronger differences of light become, -1 to 4; below 0 weaker (default: %(default)s)"
+    verb.add_argument("--amount", type=float, default=1.0, metavar="A", help=text)
+    verb.add_argument("--solver", default=USUAL, metavar="ID", help="who finds the materials (%(default)s)")
+    verb.add_argument(
+        "--camera", metavar="NAME", help="shading is finest where it looks (default: the first)"
+    )
+    verb.set_defaults(solver_param=[])
+
+
+def _add_out(verb: argparse.ArgumentParser) -> None:
+    text = "a project that is there is kept as OUT~"
+    verb.add_argument("-o", "--out", type=Path, required=True, metavar="OUT.lucarne", help=text)
+
+
 def strokes(options: argparse.Namespace, program: Headless) -> None:
     """`lucarne strokes`."""
     from studio.verbs_script import open_project
-    from studio_core.project.records import History
-    from studio_core.project.store import save
     from studio_core.strokes.files import strokes_from_file
     from studio_core.strokes.session import Easel, paint_and_solve
 
@@ -67,11 +89,7 @@ def strokes(options: argparse.Namespace, program: Headless) -> None:
         seconds = time.perf_counter() - started
         for note in made.notes:
             program.say(note)
-        for edit in made.edits:
-            document.apply(edit)
-        history = History(document.history, document.position)
-        session = None if project is None else project.session
-        save(out, document.scene, label="Strokes", history=history, session=session, fresh=True)
+        _save(out, "Strokes", document, project, made.edits)
     told = report(made, document.scene)
     if options.report is not None:
         _write(options.report, told)
@@ -87,6 +105,61 @@ def strokes(options: argparse.Namespace, program: Headless) -> None:
     result(
         options, program, values, "\n".join([f"{out}: {_count(len(made.strokes), 'stroke')}", *_lines(told)])
     )
+
+
+def stylise(options: argparse.Namespace, program: Headless) -> None:
+    """`lucarne stylise`."""
+    from studio.verbs_script import open_project
+    from studio_core.params import build
+    from studio_core.scene.nodes import MeshObject
+    from studio_core.strokes.planned import Look
+    from studio_core.strokes.session import Easel
+    from studio_core.strokes.stylising import Stylising, stylised
+
+    out: Path = options.out
+    check_target(out, (".lucarne",), "projects")
+    wanted = build(Stylising, {"amount": options.amount})
+    backend, params = chosen_backend(options, program)
+    choice = chosen_indirect(options, program)
+    solver, _ = _chosen_solver(options, program)
+    document, project = open_project(options.project)
+    scene, services = document.scene, program.services
+    view, easel = Look(options.camera).view(scene), Easel(backend, params, services, choice)
+    with replacing_if_there(out, program):
+        started = time.perf_counter()
+        with program.job("Stylising") as job:
+            solution = stylised(scene, view, wanted, solver, easel, services, job)
+        seconds = time.perf_counter() - started
+        for note in solution.notes:
+            program.say(note)
+        _save(out, "Stylise", document, project, [solution.edit])
+    painted = sum(node.paint is not None for node in document.scene.of(MeshObject))
+    values = {
+        "project": str(options.project),
+        "out": str(out),
+        "amount": options.amount,
+        "solver": options.solver,
+        "backend": backend.id,
+        "painted": painted,
+        "counts": dict(solution.counts),
+        "notes": list(solution.notes),
+        "seconds": round(seconds, 3),
+    }
+    result(options, program, values, f"{out}: {_count(painted, 'object')} painted")
+
+
+def _save(
+    out: Path, label: str, document: Document, project: LoadedProject | None, edits: Sequence[Edit]
+) -> None:
+    """The project with those steps."""
+    from studio_core.project.records import History
+    from studio_core.project.store import save
+
+    for edit in edits:
+        document.apply(edit)
+    history = History(document.history, document.position)
+    session = None if project is None else project.session
+    save(out, document.scene, label=label, history=history, session=session, fresh=True)
 
 
 def _write(path: Path, told: dict[str, Any]) -> None:
@@ -172,4 +245,4 @@ def _chosen_solver(options: argparse.Namespace, program: Headless) -> tuple[Stro
         raise InputError(f"--solver-param: {error}") from None
 
 
-__all__ = ["add_options", "report", "strokes"]
+__all__ = ["add_options", "add_stylise_options", "report", "strokes", "stylise"]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -27,6 +27,8 @@ from studio_plugins.export import plugin as export
 from studio_plugins.meshes import plugin as meshes
 from studio_plugins.reference import plugin as reference
 from studio_ui.settings import Settings
+from studio_ui.strokes.controls import StrokeControls
+from studio_ui.strokes.desk import StrokeDesk
 
 PLUGIN = Plugin(
     id="rule", label="Rule of thumb", api=API, provides={"solver": {"rule": "painting_support:SOLVER"}}
@@ -74,6 +76,16 @@ class Rule:
             ids = tuple(stroke.id for stroke in mine)
             findings.append(Finding(node, 0, ids, tuple(ranked), close=1, silent=("shine",)))
         return Solution(Compound("Rule", tuple(edits)), tuple(findings), counts={"places": len(objects)})
+
+    def stylise(self, scene: Scene, amount: float, lit: Lit, job: Job) -> Solution:
+        """Every object gets as much more of its colour."""
+        self.before()
+        if self.problem is not None:
+            raise self.problem
+        place, normal, change = np.zeros((1, 3)), np.array([[0.0, 1.0, 0.0]]), np.full((1, 3), 0.1 * amount)
+        paint = Paint.of(place, normal, np.zeros(1), {"base_color": change})
+        nodes = [node.id for node in scene.of(MeshObject)]
+        return Solution(Compound("Stylise", tuple(SetPaint(node, paint) for node in nodes)))
 
     def likeness(self, scene: Scene, stroke: NodeId, lit: Lit, params: Any, job: Job) -> Any:
         mesh = lit.surfaces.unrefined.mesh
@@ -127,3 +139,26 @@ def studio_of(folder: Path, bot: QtBot, *plugins: Plugin) -> Driver:
     driver.session.shade_with("reference", {"vertices": 500, "directions": "1024"})
     driver.session.bounce(False)
     return driver
+
+
+def brush_in_hand(driver: Driver) -> Iterator[Driver]:
+    """Over a lit room, until the test is over."""
+    try:
+        driver.show(lit_room())
+        driver.until(lambda: driver.context.warm)
+        driver.do("tool.stroke")
+        yield driver
+    finally:
+        driver.close()
+
+
+def desk(driver: Driver) -> StrokeDesk:
+    return driver.window.strokes.desk()
+
+
+def controls(driver: Driver) -> StrokeControls:
+    """The panel's inside, when it tells what is now."""
+    found = driver.window.panels["strokes"].controls
+    assert found is not None
+    driver.until(lambda: not found.soon.isActive())
+    return found

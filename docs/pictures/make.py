@@ -6,8 +6,8 @@ does and lets it rest, exact and refined. `capture` has the simulated phone phot
 capture panel make its light of that. `library` shows the library of materials in both themes. `fit` has a
 ball of the lab photographed and shows the report of the material that is made of it. `bases` and `products`
 draw figures 8 and 10 of the interreflection paper. `between` renders the room with the red cabinet with and
-without light between surfaces. `strokes NUMBER …` plays figures of the
-paper on strokes, `painted` paints on the sample room.
+without light between surfaces. `strokes` paints on the sofa and shows why that is explained as it is.
+`figures NUMBER …` plays figures of the paper on strokes, `painted` paints on the sample room.
 """
 
 from __future__ import annotations
@@ -388,6 +388,13 @@ def fit() -> None:
     studio.close()
 
 
+def strokes() -> None:
+    """The stroke panel after a stroke on the sofa in the colour of the armchair."""
+    from painted_sofa import photograph
+
+    photograph(HERE / "strokes.webp", WINDOW, 5 * SETTLED)
+
+
 def bases() -> None:
     """Figure 8 of the interreflection paper."""
     from studio.bench.interreflection_figures import figure_8
@@ -406,7 +413,7 @@ def products() -> None:
     (HERE / "interreflection-products.svg").write_text(svg(figure_10(Headless(quiet=True))))
 
 
-def strokes(*numbers: str) -> None:
+def figures(*numbers: str) -> None:
     """Figures 14–22 of the paper on strokes, or some of them."""
     from PIL import Image
 
@@ -441,5 +448,6 @@ def painted() -> None:
 if __name__ == "__main__":
     makers = {"room": room, "windows": windows, "window": window, "chair": chair, "capture": capture}
     makers |= {"library": library, "captured": captured, "fit": fit, "between": between}
-    makers |= {"bases": bases, "products": products, "strokes": strokes, "painted": painted}
+    makers |= {"bases": bases, "products": products, "strokes": strokes}
+    makers |= {"figures": figures, "painted": painted}
     makers[sys.argv[1]](*sys.argv[2:])

@@ -1,7 +1,7 @@
 """The paper's figures 14–22 as sessions: strokes as a file has them, painted act by act.
 
 Cases `figure-N`: what a session's claims are stands in its `limits`, by metric; `holds` is 1 where all do.
-`docs/pictures/make.py strokes-figures` draws them.
+`docs/pictures/make.py figures` draws them.
 """
 
 from __future__ import annotations

@@ -101,15 +101,15 @@ class Stroking(ABC):
     def stylise(self, amount: float = 1.0, solver: str = "joint") -> None:
         """Paint all objects so that the scene's light is sharpened, or with a negative amount smoothed."""
         from studio_core.strokes.session import KIND, Easel
+        from studio_core.strokes.stylising import Stylising, stylised
 
         scene, view, services = self.scene, self._session.view, self._services()
+        wanted = build(Stylising, {"amount": amount})
 
         def work(job: Job) -> Solution:
             chosen, (backend, params, choice) = self._registry.get(KIND, solver), self._shaded_by()
             easel = Easel(backend, params, services, choice)
-            easel.picture(scene, view, job)
-            made: Solution = chosen.open(services).stylise(scene, amount, easel.lit(), job)
-            return made
+            return stylised(scene, view, wanted, chosen, easel, services, job)
 
         solution: Solution = self._run("Stylising", work)
         self._document.apply(solution.edit)

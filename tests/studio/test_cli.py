@@ -428,6 +428,7 @@ def test_no_verb_without_a_window_loads_qt(files: Path) -> None:
         ["script", "script.py"],
         ["precompute", "made.lucarne", *QUICK],
         ["strokes", "made.lucarne", "strokes.json", "-o", "painted.lucarne", *QUICK],
+        ["stylise", "painted.lucarne", "-o", "painted.lucarne", *QUICK],
         ["capture", "--equirect", "all.jpg", "-o", "light.exr", "--set", "stitch.width=64"],
         ["fit-brdf", "chalk.csv", "--model", "lambert", "-o", "chalk.lucmat"],
         ["fit-material", "ball", "--size", "8", "--no-refine", "--basis", "albedo"],

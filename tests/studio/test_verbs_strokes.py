@@ -131,3 +131,39 @@ def test_a_project_that_is_open_is_not_replaced(room: Path, capsys: pytest.Captu
         assert main(["strokes", "room.lucarne", "strokes.json", "-o", "out.lucarne", *QUICK]) == BAD_INPUT
     assert "open" in capsys.readouterr().err
     assert (room / "out.lucarne").read_bytes() == before
+
+
+def test_a_scene_is_stylised_in_a_step_that_can_be_undone(
+    room: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    command = ["stylise", "room.lucarne", "-o", "out.lucarne", "--amount", "-0.5", "--json", *QUICK]
+    assert main(command) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert (told["amount"], told["painted"]) == (-0.5, 2)
+    assert told["counts"]["solved"] > 0
+    loaded = load(room / "out.lucarne")
+    document = Document(loaded.scene)
+    document.restore(*loaded.history.opened())
+    assert document.history[document.position].label == "Stylise"
+    assert document.scene["cube"].paint is not None
+    document.undo()
+    assert document.scene["cube"].paint is None
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (["--amount", "9"], "amount"),
+        (["--camera", "Attic"], "Attic"),
+        (["--solver", "magic"], "joint"),
+        (["-o", "out.txt"], ".lucarne"),
+    ],
+)
+def test_stylise_refuses_in_one_line(
+    room: Path, change: list[str], words: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["stylise", "room.lucarne", "-o", "out.lucarne", *QUICK, *change]) == BAD_INPUT
+    said = capsys.readouterr().err
+    assert len(said.splitlines()) == 1
+    assert words in said
+    assert not (room / "out.lucarne").exists()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+from pathlib import Path
 
 import pytest
 from names import nameless
@@ -11,9 +12,10 @@ from PySide6.QtGui import QContextMenuEvent
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QLineEdit, QWidget
 from pytestqt.qtbot import QtBot
-from ui_support import Driver
+from ui_support import Driver, room
 
 from studio_core.params import ParamInfo
+from studio_core.project.store import save
 from studio_core.registry import PluginHost
 from studio_ui.console.running import StopDialog
 from studio_ui.dialogs import KeysDialog
@@ -62,6 +64,14 @@ def test_menus_open_by_their_letters(driver: Driver) -> None:
     texts = [action.text() for action in driver.window.menuBar().actions()]
     letters = [text[text.index("&") + 1].casefold() for text in texts]
     assert len(set(letters)) == len(letters)
+
+
+def test_the_keys_of_the_picture_work_as_soon_as_a_project_is_opened(chosen: Driver, tmp_path: Path) -> None:
+    save(tmp_path / "room.lucarne", room())
+    chosen.do("window.next")
+    assert QApplication.focusWidget() is not chosen.viewport
+    chosen.window.files.open(tmp_path / "room.lucarne")
+    chosen.until(lambda: QApplication.focusWidget() is chosen.viewport)
 
 
 def test_f6_goes_round_picture_bars_and_panels(chosen: Driver) -> None:

@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 from ui_support import Driver, Make, room
 
-from studio_core.edits import Add, Edit, Move, SetFields, SetMaterial
+from studio_core.edits import Add, Edit, Move, SetFields, SetMaterial, SetPaint
 from studio_core.scene.diff import Aspect
 from studio_core.scene.nodes import PointLamp
+from studio_core.scene.paint import Paint
 from studio_core.scene.transform import Transform
 from studio_core.session import View
 from studio_ui.feed import Freshness
@@ -205,10 +206,13 @@ def asked_for(driver: Driver) -> list[tuple[View, bool, Aspect]]:
         SetMaterial("red", {"roughness": 0.7}),
         SetFields("lamp", {"intensity": 3.0}),
         Move({"lamp": Transform((0.0, 2.0, 0.0))}),
+        SetPaint("stool", Paint.of([[0, 0, 0]], [[0, 1, 0]], [0], {"base_color": [[0.1, 0.0, 0.0]]})),
     ],
-    ids=["material", "gain", "lamp"],
+    ids=["material", "gain", "lamp", "paint"],
 )
-def test_dragging_a_material_or_a_light_keeps_what_is_seen_at_rest(driver: Driver, edit: Edit) -> None:
+def test_dragging_a_material_or_a_light_or_painting_keeps_what_is_seen_at_rest(
+    driver: Driver, edit: Edit
+) -> None:
     driver.document.apply(Add((PointLamp(id="lamp", name="Lamp"),)))
     driver.settle()
     driver.feed.restart()  # whatever the new lamp made of the window's layout

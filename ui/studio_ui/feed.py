@@ -29,7 +29,7 @@ from studio_ui.pace import Pace
 
 _SLOW = Aspect.TRANSFORM | Aspect.STRUCTURE
 """What takes long to be exact: also a single step of it, such as undo, is first seen quickly."""
-_LOOKS = Aspect.MATERIAL | Aspect.LIGHT | Aspect.GAIN | Aspect.NAME
+_LOOKS = Aspect.MATERIAL | Aspect.STROKES | Aspect.LIGHT | Aspect.GAIN | Aspect.NAME
 """What leaves every surface where it is."""
 REST_MS = 260
 REST_PIXELS, REST_SAMPLES = 2_400_000, 4_500_000

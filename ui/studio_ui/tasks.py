@@ -77,6 +77,21 @@ class Tasks:
         (executor or self._executor).submit(lambda: self._work(task, work, done, failed))
         return task
 
+    def follow(self, job: Job) -> Callable[[], None]:
+        """Tell of a job that somebody else runs, until what is returned is called."""
+        task = Task(job, "running")
+        self.running.append(task)
+        self.changed.emit()
+
+        def over() -> None:
+            if task in self.running:
+                task.ended, task.state = time.monotonic(), "cancelled" if job.cancelled else "done"
+                self.running.remove(task)
+                self.finished.append(task)
+                self.changed.emit()
+
+        return over
+
     def cancel(self) -> None:
         """Ask all of them to stop."""
         for task in self.running:

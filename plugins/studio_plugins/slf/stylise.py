@@ -3,6 +3,7 @@
 What is wanted is l_o + amount · (l_o − its mean over elements around, in the same direction of the world).
 All elements are solved for it; the answer is paint on all objects: parameters times what albedos were
 multiplied with, so that pictures, and what a material has beyond the paper's three numbers, stay as they are.
+Paint that is there already is multiplied with the material under it.
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ from studio_core.scene.paint import Paint
 from studio_core.scene.world_mesh import WorldMesh
 from studio_core.shading.job import Job
 from studio_core.shading.materials import scalar
+from studio_core.shading.painting import Coat, Coats
 from studio_core.strokes.solution import Lit, Solution
 from studio_core.strokes.solved import Solved as Painted
 from studio_core.transport.cells import CELLS, PARTS, RINGS, cell_directions, cell_of
@@ -124,6 +126,7 @@ def _paints(
 ) -> tuple[Mapping[NodeId, Paint | None], tuple[str, ...]]:
     paints: dict[NodeId, Paint | None] = {}
     notes: list[str] = []
+    coats = Coats(services.registry)(scene, mesh)
     for index, placed in enumerate(mesh.objects):
         node = scene[placed.node]
         own = np.flatnonzero((mesh.object[at] == index) & ~made.flagged)
@@ -131,7 +134,7 @@ def _paints(
             continue
         vertices = at[own] - mesh.vertex_offsets[index]
         slots = np.zeros(len(own), np.int64)
-        changes: dict[str, F64] = {}
+        changes = _painted(coats.get(index), vertices)
         for slot, number in enumerate(placed.materials):
             some = np.flatnonzero(mesh.material[at[own]] == number)
             material = scene.material(node.materials[slot]) if slot < len(node.materials) else None
@@ -139,7 +142,8 @@ def _paints(
             if dressed is None or not len(some):
                 continue
             slots[some] = slot
-            for name, delta in _changes(dressed, now, made.reflectances, own[some]).items():
+            before = {name: change[some] for name, change in changes.items()}
+            for name, delta in _changes(dressed, before, now, made.reflectances, own[some]).items():
                 whole = changes.setdefault(name, np.zeros((len(own), delta.shape[1])))
                 if whole.shape[1] == delta.shape[1]:
                     whole[some] = delta
@@ -151,10 +155,20 @@ def _paints(
     return paints, tuple(notes)
 
 
-def _changes(dressed: Dressed, now: Reflectances, then: Reflectances, own: I64) -> dict[str, F64]:
-    """By parameter what paint adds at elements (N,): (N, 1) or (N, 3)."""
+def _painted(coat: Coat | None, vertices: I64) -> dict[str, F64]:
+    """By parameter what an object's paint adds already at some of its vertices (N,): (N, 1) or (N, 3)."""
+    if coat is None:
+        return {}
+    weights = coat.weights.some(vertices)
+    return {name: weights(coat.paint.change(name)).astype(np.float64) for name in coat.paint.changes}
+
+
+def _changes(
+    dressed: Dressed, before: Mapping[str, F64], now: Reflectances, then: Reflectances, own: I64
+) -> dict[str, F64]:
+    """By parameter what paint adds at elements (N,), to which it adds `before` already: (N, 1) or (N, 3)."""
     made: dict[str, F64] = {}
-    for role, before, after in (
+    for role, old, new in (
         ("diffuse", now.diffuse[own], then.diffuse[own]),
         ("specular", now.specular[own], then.specular[own]),
     ):
@@ -162,20 +176,25 @@ def _changes(dressed: Dressed, now: Reflectances, then: Reflectances, own: I64) 
             continue
         name = dressed.roles[role]
         info: ParamInfo = dressed.infos[name]
-        value = np.atleast_1d(np.asarray(dressed.resolved.values[name], np.float64))
-        ratio = np.clip(after / np.maximum(before, 1e-4), 1 / MOST, MOST)
-        if len(value) == 1:
+        own_value = np.atleast_1d(np.asarray(dressed.resolved.values[name], np.float64))
+        value = own_value + before.get(name, 0.0)
+        ratio = np.clip(new / np.maximum(old, 1e-4), 1 / MOST, MOST)
+        if len(own_value) == 1:
             ratio = ratio.mean(axis=1, keepdims=True)
         high = math.inf if info.high is None else float(info.high)
-        made[name] = np.minimum(value * ratio, high) - value
+        made[name] = np.minimum(value * ratio, high) - own_value
     if "gloss" in dressed.roles:
         name = dressed.roles["gloss"]
-        gloss = scalar(dressed.resolved.values[name])
-        levels = dressed.level_of(gloss) + then.level[own] - now.level[own]
-        new = np.array([dressed.gloss_of(float(level)) for level in levels])
-        new = np.where(np.abs(then.level[own] - now.level[own]) < 1e-9, gloss, new)
         logarithmic = dressed.infos[name].scale == "log"
-        delta = np.log(np.maximum(new, 1e-12) / max(gloss, 1e-12)) if logarithmic else new - gloss
+        gloss, added = scalar(dressed.resolved.values[name]), before.get(name, np.zeros((len(own), 1)))[:, 0]
+        here = gloss * np.exp(added) if logarithmic else gloss + added
+        step = then.level[own] - now.level[own]
+        levels = np.array([dressed.level_of(float(one)) for one in here]) + step
+        made_gloss = np.array([dressed.gloss_of(float(level)) for level in levels])
+        made_gloss = np.where(np.abs(step) < 1e-9, here, made_gloss)
+        delta = (
+            np.log(np.maximum(made_gloss, 1e-12) / max(gloss, 1e-12)) if logarithmic else made_gloss - gloss
+        )
         made[name] = delta[:, None]
     return made
 

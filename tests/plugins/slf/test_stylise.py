@@ -10,8 +10,10 @@ from path_rooms import furnished, stand
 from scenes import sky
 
 from studio_core.contract import Services
+from studio_core.edits import Compound, SetPaint
 from studio_core.parallel import Workers
 from studio_core.scene.nodes import Environment, Material, MeshObject, PointLamp
+from studio_core.scene.paint import Paint
 from studio_core.scene.transform import Transform
 from studio_core.shading.job import Job
 from studio_core.shading.offline import backend_params, scene_view, shade
@@ -35,8 +37,8 @@ def services(host):
     return Services(Workers(2), host)
 
 
-def solved(services, amount):
-    scene = furnished([SKY, BULB], PAINT)
+def solved(services, amount, *edits):
+    scene = Compound("Before", edits)(furnished([SKY, BULB], PAINT))
     made = stand(scene, services, 1500)
     lit = Lit(made.surfaces, made.casters, made.shapes, made.lighting, made.hits, None)
     whole = Whole(services.workers, 400)
@@ -73,9 +75,17 @@ def test_every_object_is_painted_and_can_be_undone(services):
     after = solution.edit(scene)
     painted = [node for node in after.of(MeshObject) if node.paint is not None]
     assert {node.id for node in painted} == {"floor", "back", "side", "box"}
-    assert "exponent" in scene["box"].paint.changes if scene["box"].paint else True
     for node in painted:
         assert all(np.isfinite(table.values).all() for table in node.paint.changes.values())
+
+
+def test_paint_that_is_there_stays_under_it(services):
+    change = {"diffuse": [[0.3, -0.1, 0.2]], "exponent": [1.0]}
+    paint = Paint.of([[0, 0, 0]], [[0, 1, 0]], [0], change)
+    solution = solved(services, 0.0, SetPaint("box", paint))[2]
+    made = solution.edit(solved(services, 0.0)[0])["box"].paint
+    for name, value in change.items():
+        assert np.allclose(made.change(name), np.reshape(value, (1, -1)), atol=2e-3), name
 
 
 def test_neighbours_are_of_the_same_object(services):

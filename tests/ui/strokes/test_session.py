@@ -9,8 +9,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from painting_support import PLUGIN, Rule, lit_room, studio_of
+from names import nameless
+from painting_support import PLUGIN, Rule, brush_in_hand, controls, desk, studio_of
 from PySide6.QtCore import QPoint, Qt
+from PySide6.QtGui import QPalette
 from PySide6.QtWidgets import QLabel, QToolButton
 from pytestqt.qtbot import QtBot
 from ui_support import Driver
@@ -21,8 +23,6 @@ from studio_core.scene.paint import Paint
 from studio_core.strokes.stroke import GLOSS, Stroke
 from studio_plugins.slf import plugin as slf
 from studio_ui.canvas.viewport import Pointer
-from studio_ui.strokes.controls import StrokeControls
-from studio_ui.strokes.desk import StrokeDesk
 from studio_ui.strokes.sketches import HEIGHT, WIDTH
 
 ALT, CTRL, SHIFT = (
@@ -46,29 +46,6 @@ def painter(rule: Rule, qtbot: QtBot, tmp_path: Path) -> Iterator[Driver]:
     yield from brush_in_hand(studio_of(tmp_path / "state", qtbot, PLUGIN))
 
 
-def brush_in_hand(driver: Driver) -> Iterator[Driver]:
-    """Over a lit room, until the test is over."""
-    try:
-        driver.show(lit_room())
-        driver.until(lambda: driver.context.warm)
-        driver.do("tool.stroke")
-        yield driver
-    finally:
-        driver.close()
-
-
-def desk(driver: Driver) -> StrokeDesk:
-    return driver.window.strokes.desk()
-
-
-def controls(driver: Driver) -> StrokeControls:
-    """The panel's inside, when it tells what is now."""
-    found = driver.window.panels["strokes"].controls
-    assert found is not None
-    driver.until(lambda: not found.soon.isActive())
-    return found
-
-
 def strokes(driver: Driver) -> list[Stroke]:
     return list(driver.document.scene.of(Stroke))
 
@@ -90,8 +67,10 @@ def stool(driver: Driver) -> MeshObject:
 
 
 def has_picture(card: QToolButton) -> bool:
+    """Not the bare patch of before."""
     image = card.icon().pixmap(WIDTH, HEIGHT).toImage()
-    return image.pixelColor(image.width() // 2, image.height() // 2).alpha() > 0
+    bare = card.palette().color(QPalette.ColorRole.Base)
+    return image.pixelColor(image.width() // 2, image.height() // 2) != bare
 
 
 def same(one: Paint | None, other: Paint | None) -> bool:
@@ -206,12 +185,16 @@ def test_the_runner_up_is_a_click_away(painter: Driver) -> None:
     assert "Cannot tell from here: shine" in told
     assert "One other reason is nearly as good" in told
     first = stool(driver).paint
+    driver.until(lambda: all(has_picture(card) for card in why.cards))
+    driver.do("stroke.stylise")
+    assert nameless(driver.window) == []
     why.cards[1].click()
     assert driver.labels()[-1] == "Gloss of Stool"
     assert stool(driver).paint is not None
     assert "roughness" in stool(driver).paint.changes
     assert strokes(driver)[0].meaning == GLOSS
     assert [card.isChecked() for card in controls(driver).why.cards] == [False, True]
+    assert all(has_picture(card) for card in controls(driver).why.cards), "those of before"
     driver.do("edit.undo")
     assert stool(driver).paint is first
     assert [card.isChecked() for card in controls(driver).why.cards] == [True, False]

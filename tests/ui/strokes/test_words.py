@@ -2,23 +2,25 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from ui_support import room
 
-from studio_core.edits import Add, Compound
+from studio_core.edits import Add, Compound, SetFields
 from studio_core.scene.transform import looking
 from studio_core.session import View
 from studio_core.strokes.marks import Marks
 from studio_core.strokes.solution import Finding, Reason
-from studio_core.strokes.stroke import AUTOMATIC, COLOUR, GLOSS, TOOLS, Stroke
+from studio_core.strokes.stroke import AUTOMATIC, COLOUR, FIXATE, GLOSS, TOOLS, Stroke
 from studio_ui.canvas.projection import project
 from studio_ui.strokes.sketches import around
-from studio_ui.strokes.why import chosen_reason
+from studio_ui.strokes.why import chosen_reason, swatch, worth_showing
 from studio_ui.strokes.words import TOOLS as NAMES
-from studio_ui.strokes.words import changed, painted_on, place, sentence, silence
+from studio_ui.strokes.words import changed, nothing_found, painted_on, place, sentence, silence
 
 
 def reason(meaning: str, explained: float = 0.93, **values: float | tuple[float, float, float]) -> Reason:
@@ -34,6 +36,8 @@ def test_things_are_called_by_their_groups() -> None:
     assert painted_on(scene, ["seat"]) == painted_on(scene, ["seat", "back"]) == "Chair"
     assert painted_on(scene, ["stool", "seat"]) == "2 things"
     assert painted_on(scene, ["gone"]) == "nothing"
+    fixed = SetFields("chair", {"locked": True})(scene)
+    assert painted_on(fixed, ["seat"]) == "Seat", "of a room that stays where it is, its part"
     assert [place(scene, node) for node in ("seat", "stool", "gone")] == [
         "Chair · Seat",
         "Stool",
@@ -44,9 +48,9 @@ def test_things_are_called_by_their_groups() -> None:
 def test_a_finding_is_a_sentence() -> None:
     finding = Finding("seat", 0, ("s",), (reason("shine", shine=0.35),))
     change = changed({"shine": 0.04}, {"shine": "Shine"}, finding.reasons[0])
-    told = sentence(room(), finding, finding.reasons[0], change)
+    told = sentence(place(room(), "seat"), finding.reasons[0], change)
     assert told == "Chair · Seat: shine 0.04 → 0.35, explains 93 % of the stroke"
-    assert sentence(room(), finding, reason(""), "") == "Chair · Seat: nothing needs to change"
+    assert sentence("Chair · Seat", reason(""), "") == "Chair · Seat: nothing needs to change"
     assert silence(finding) == ""
     assert (
         silence(Finding("seat", 0, (), (), silent=("shine", "gloss")))
@@ -62,7 +66,7 @@ def test_what_changes_most_is_told_first_and_what_stays_not_at_all() -> None:
 
 @given(st.floats(-10, 10))
 def test_shares_are_shares(explained: float) -> None:
-    told = sentence(room(), Finding("seat", 0, (), ()), reason("shine", explained), "")
+    told = sentence("Seat", reason("shine", explained), "")
     assert 0 <= int(told.split("explains ")[1].split(" %")[0]) <= 100
 
 
@@ -70,6 +74,26 @@ def test_what_was_taken_is_what_it_means() -> None:
     finding = Finding("stool", 0, ("s",), (reason(COLOUR), reason(GLOSS)))
     for meaning, expected in ((AUTOMATIC, COLOUR), (GLOSS, GLOSS), (COLOUR, COLOUR), ("everything", COLOUR)):
         assert chosen_reason(Stroke(id="s", meaning=meaning), finding).meaning == expected
+
+
+def test_colours_are_seen_and_read() -> None:
+    found, before = reason("colour", b=(1.0, 0.0, 0.0), c=0.5), {"b": (0.0, 0.0, 0.0), "c": 0.2}
+    told = changed(before, {}, found, swatch)
+    assert re.findall("#[0-9a-f]{6}", told) == ["#000000", "#ff0000"]
+    assert "c 0.2 → 0.5" in told
+
+
+def test_what_explains_nothing_is_not_offered() -> None:
+    reasons = (reason(COLOUR), reason(GLOSS, 0.004), reason("", 0.0), reason("shine", 0.2))
+    finding = Finding("stool", 0, ("s",), reasons)
+    assert [r.meaning for r in worth_showing(finding, reasons[0])] == [COLOUR, "", "shine"]
+    assert reasons[1] in worth_showing(finding, reasons[1])
+
+
+def test_strokes_without_an_explanation_say_what_that_means() -> None:
+    told = {nothing_found(Stroke(id="s", tool=tool, indirect=far))
+            for tool, far in ((FIXATE, False), (TOOLS[0], True), (TOOLS[0], False))}  # fmt: skip
+    assert len(told) == 3
 
 
 def stroke(places: np.ndarray) -> Stroke:

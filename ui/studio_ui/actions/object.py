@@ -43,6 +43,8 @@ ITEMS: tuple[Item, ...] = (
     ActionSpec("stroke.indirect", "Change what is reflected", "Object/Stroke", "",
                "Strokes change what lights the surface or shows in it, and not the surface",
                checked="stroke_indirect"),
+    ActionSpec("stroke.stylise", "Stylise the scene…", "Object/Stroke", "",
+               "Sharpen or smooth the light of the whole scene by its materials", enabled="furnished"),
     ActionSpec("tool.local_axes", "Use its own axes", "Object", "L",
                "Arrows and rings turn with what is chosen, instead of standing as the room does",
                checked="local_axes", canvas=True),

@@ -79,3 +79,4 @@ class Front:
     def _opened(self) -> None:
         self.notices.clear()
         self.start_page.open_again()
+        self.widget.setFocus()  # so that the keys of the picture work

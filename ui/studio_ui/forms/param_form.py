@@ -64,7 +64,7 @@ class ParamForm(QWidget):
             rows = form_layout(inside)
             for name, info in folded.items():
                 self._add(rows, name, info, sink)
-            self.more = _fold(inside, unfolded)
+            self.more = fold(inside, "More", "What seldom needs to be changed", unfolded)
             layout.addRow(self.more)
             layout.addRow(inside)
 
@@ -98,11 +98,11 @@ class ParamForm(QWidget):
                 self._resets[name].offer(name in mixed or value != self._defaults[name])
 
 
-def _fold(inside: QWidget, unfolded: bool) -> QToolButton:
+def fold(inside: QWidget, text: str, tool_tip: str, unfolded: bool = False) -> QToolButton:
     """A button that shows and hides `inside`."""
     button = QToolButton()
-    button.setText("More")
-    button.setToolTip("What seldom needs to be changed")
+    button.setText(text)
+    button.setToolTip(tool_tip)
     button.setCheckable(True)
     button.setAutoRaise(True)
     button.setProperty("role", "fold")

@@ -72,6 +72,11 @@ class Bench:
             solution = run.solve(scene, strokes, lit, params, job)
         return Answer(edit, scene, strokes, solution)
 
+    def stylise(self, scene: Scene, amount: float, lit: Lit, solver: str, job: Job) -> Solution:
+        """See `StrokeRun.stylise`."""
+        run, _ = self._run(solver)
+        return run.stylise(scene, amount, lit, job)
+
     def likeness(self, scene: Scene, stroke: NodeId, lit: Lit, solver: str, job: Job) -> Any:
         """(V,) as `StrokeRun.likeness`."""
         run, params = self._run(solver)

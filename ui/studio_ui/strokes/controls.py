@@ -20,18 +20,19 @@ from PySide6.QtWidgets import (
 from studio_core.edits import Remove, SetFields
 from studio_core.errors import LucarneError
 from studio_core.params import Value, param_infos
-from studio_core.scene.diff import Changes
+from studio_core.scene.diff import Aspect, Changes
 from studio_core.scene.nodes import NodeId, Scene
 from studio_core.strokes.stroke import BLUR, BRIGHTEN, DARKEN, REPLACE, SHARPEN, SMEAR, Stroke
 from studio_ui.forms.fields import Combo
 from studio_ui.forms.param_form import ParamForm
 from studio_ui.forms.sinks import LiveSink
 from studio_ui.look.theme import GAP, Theme
-from studio_ui.panels.panel import Panel, heading, row
+from studio_ui.panels.panel import Panel, heading, note, row
 from studio_ui.strokes.bench import Order
 from studio_ui.strokes.brush_store import REACH, brush_infos
 from studio_ui.strokes.desk import StrokeDesk
 from studio_ui.strokes.radiance_field import field_of
+from studio_ui.strokes.scene_style import SceneStyle
 from studio_ui.strokes.stroke_list import StrokeList
 from studio_ui.strokes.stroke_sink import StrokeSink
 from studio_ui.strokes.why import Why
@@ -52,6 +53,8 @@ _HANDS = (
     (True, "What it shows", "The surface stays; what lights it or is reflected in it changes"),
 )
 _STROKE = ("weight", "meaning", "together", *REACH)
+_SELDOM = ("weight", "together", *REACH)
+"""Folded up: why a stroke is explained as it is should be seen in a small window."""
 
 
 class StrokeControls(QWidget):
@@ -68,6 +71,8 @@ class StrokeControls(QWidget):
         column = panel.column_of(self)
         column.addLayout(self._tool_buttons())
         column.addLayout(self._hand_buttons())
+        self.dark = note("Nothing lights anything else now: switch on Light between surfaces on the toolbar.")
+        column.addWidget(self.dark)
         self.brush = self._brush_form()
         column.addWidget(self.brush)
         self.across = QCheckBox("On whatever is under the brush")
@@ -86,28 +91,31 @@ class StrokeControls(QWidget):
         self.list.deleted = self.delete
         self.bin = panel.tool("delete", "Delete the chosen stroke; what is left is solved again")
         self.bin.clicked.connect(self.delete)
-        column.addLayout(row(heading("Strokes"), self.bin, stretch=0))
-        column.addWidget(self.list)
         self.spread = QToolButton()
         self.spread.setText("Show the spread")
         self.spread.setToolTip("A pattern over the picture: what else changes with the chosen stroke")
         self.spread.setCheckable(True)
         self.spread.toggled.connect(lambda _: self._show_spread())
+        column.addLayout(row(heading("Strokes"), self.spread, self.bin, stretch=0))
+        column.addWidget(self.list)
         self._held = ""
         sink = StrokeSink(self._context, desk.work, desk.store, lambda: desk.stroke, self._hold)
-        infos = {name: info for name, info in param_infos(Stroke).items() if name in _STROKE}
+        infos = {name: dataclasses.replace(info, advanced=name in _SELDOM)
+                 for name, info in param_infos(Stroke).items() if name in _STROKE}  # fmt: skip
         self.form = ParamForm(infos, sink)
         column.addWidget(self.form)
-        column.addLayout(row(self.spread))
         column.addWidget(heading("Why"))
         self.why = Why(self._context.host, desk.sketches)
         self.why.taken = desk.work.take
         column.addWidget(self.why)
+        self.style_ = SceneStyle(self._context, desk.store, desk.work.bench)
+        column.addWidget(self.style_)
         panel.subscriptions.add(
             desk.store.changed.connect(self._show_brush),
             desk.changed.connect(self._later),
             self._context.document.changed.connect(self._edited),
             self._context.session.displayed.connect(self._show_brush),
+            self._context.session.changed.connect(self._lit_otherwise),
         )
         self._seen: QTimer | None = None
         self._show_brush()
@@ -146,11 +154,16 @@ class StrokeControls(QWidget):
         now = self._desk.store.now
         self.tools[now.tool].setChecked(True)
         self.hands[now.indirect].setChecked(True)
+        self.dark.setVisible(now.indirect and not self._context.session.bouncing)
         with QSignalBlocker(self.across):
             self.across.setChecked(now.across)
         for name in _SETTINGS:
             self.brush.show_row(name, name in _OF_TOOL.get(now.tool, ()))
         self.brush.show_values(self._desk.store.values())
+
+    def _lit_otherwise(self, aspect: Aspect) -> None:
+        if aspect & Aspect.INDIRECT:
+            self._show_brush()
 
     def paintEvent(self, event: QPaintEvent) -> None:
         """Solvers are asked for their names once somebody sees this: to ask loads them."""
@@ -234,10 +247,12 @@ class StrokeControls(QWidget):
             self.why.say("Paint on the picture: what explains the stroke is told here.")
         elif stroke.hidden:
             self.why.say("This stroke does not count.")
+        elif not found and desk.work.asking:
+            self.why.say("Looking for what explains it…")
         elif desk.work.solution is not None and (found or desk.work.knows(stroke.id)):
             self.why.show_findings(scene, stroke, found, desk.work.solution)
         else:
-            self.why.say("Looking for what explains it…" if desk.work.asking else "")
+            self.why.say("")
 
 
 class _BrushSink(LiveSink):

@@ -36,13 +36,14 @@ class StrokeDesk:
         self.store = BrushStore(settings)
         self.work = StrokeWork(context, self.store)
         self.likeness = Likeness(context, self.store, self.work.bench)
-        self.sketches = Sketches(context)
+        self.sketches = Sketches(context, lambda: not (self.work.begun or self.work.asking))
         self.hand = StrokeHand(context, viewport, looking, self.store, self.work, hint, refresh)
         self.hand.also = lambda: self.likeness.marks(viewport.placed())
         self._document = context.document
         self._subscriptions = Subscriptions()
         self._subscriptions.add(
             self.work.found.connect(self.changed.emit),
+            self.work.moved.connect(self.sketches.follow),
             self.work.moved.connect(self.changed.emit),
             self.likeness.changed.connect(refresh),
             context.document.changed.connect(self._edited),

@@ -35,7 +35,7 @@ class StrokeFeature:
         show: Callable[[], object],
     ) -> None:
         self._context, self._viewport, self._tools = context, viewport, tools
-        self._settings, self._hint = settings, hint
+        self._settings, self._hint, self._show, self._panel = settings, hint, show, panel
         self._desk: StrokeDesk | None = None
         tools.own[TOOL] = self
         panel.desk = self.desk
@@ -49,6 +49,7 @@ class StrokeFeature:
             "stroke.softer": lambda: self.desk().store.harder(-1),
             "stroke.harder": lambda: self.desk().store.harder(),
             "stroke.indirect": self._turn,
+            "stroke.stylise": self._stylise,
         }
 
     def conditions(self) -> dict[str, Callable[[], bool]]:
@@ -79,6 +80,12 @@ class StrokeFeature:
     def _turn(self) -> None:
         store = self.desk().store
         store.use(indirect=not store.now.indirect)
+
+    def _stylise(self) -> None:
+        """Where it is chosen how much."""
+        self._show()
+        if self._panel.controls is not None:
+            self._panel.controls.style_.unfold()
 
     # as a tool
 

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from PySide6.QtCore import QObject, QTimer
 
 from studio_core.errors import EditError
-from studio_core.scene.diff import Changes, diff, view_changed
+from studio_core.scene.diff import Aspect, Changes, diff, view_changed
 from studio_core.scene.nodes import NodeId, Scene
 from studio_core.scene.transform import looking
 from studio_core.session import Session, View
@@ -23,32 +24,39 @@ from studio_ui.context import Context, Subscriptions
 from studio_ui.feed import Freshness
 from studio_ui.tasks import Task
 
-WIDTH, HEIGHT = 112, 84
-_ROOM = 2.2  # times the stroke's size, that is seen
+WIDTH, HEIGHT = 132, 96
+_ROOM = 1.8  # times the stroke's size, that is seen
 _LEAST, _MOST = 6.0, 60.0  # degrees
 _WAIT_MS = 150
+_KEPT = 12  # pictures
 
 
 class Sketches(QObject):
-    """One at a time, while the picture is up to date; whatever is asked of the pictures stops it."""
+    """One at a time, while the picture is up to date and `free()`; whatever is asked of pictures stops it."""
 
-    def __init__(self, context: Context) -> None:
+    def __init__(self, context: Context, free: Callable[[], bool] = lambda: True) -> None:
         super().__init__()
-        self._context = context
+        self._context, self._free = context, free
         self._pipeline: Any = None
         self._before: Frame | None = None
         self._waiting: list[tuple[Scene, NodeId, Reason, Callable[[Picture], object]]] = []
         self._task: Task | None = None
+        self._kept: dict[int, _Kept] = {}  # by id of the reason, the newest last
         self._soon = QTimer(self)
         self._soon.setSingleShot(True)
         self._soon.timeout.connect(self._next)
         self._subscriptions = Subscriptions()
-        self._subscriptions.add(context.feed.freshness.connect(lambda _: self._follow()))
+        self._subscriptions.add(context.feed.freshness.connect(lambda _: self.follow()))
 
     @property
     def session(self) -> Session:
         """How pictures are shown."""
         return self._context.session
+
+    @property
+    def done(self) -> bool:
+        """Whether none is wanted."""
+        return self._task is None and not self._waiting
 
     def close(self) -> None:
         """Make no more."""
@@ -63,40 +71,52 @@ class Sketches(QObject):
             self._task.job.cancel()
 
     def want(self, scene: Scene, stroke: NodeId, reason: Reason, done: Callable[[Picture], object]) -> None:
-        """A picture of the scene as a reason would make it, of the place of a stroke."""
-        self._waiting.append((scene, stroke, reason, done))
-        self._follow()
+        """A picture of the scene as a reason would make it, of the place of a stroke.
 
-    def _follow(self) -> None:
-        if self._context.feed.state is Freshness.CURRENT:
+        One that was made of that reason is given at once; another follows if it is out of date.
+        """
+        kept = self._kept.get(id(reason))
+        if kept is not None:
+            done(kept.picture)
+            if kept.shows(scene, around(scene, stroke, self._context.session.view)):
+                return
+        self._waiting.append((scene, stroke, reason, done))
+        self.follow()
+
+    def follow(self) -> None:
+        """Begin, or make way for what comes first."""
+        free, state = self._free(), self._context.feed.state
+        if free and state is Freshness.CURRENT:
             self._soon.start(_WAIT_MS)
-        elif self._task is not None and self._context.feed.state is Freshness.STALE:
+        elif self._task is not None and (not free or state is Freshness.STALE):
             self._task.job.cancel()
 
     def _next(self) -> None:
-        if self._task is not None or not self._waiting or self._context.feed.state is not Freshness.CURRENT:
+        now = self._free() and self._context.feed.state is Freshness.CURRENT
+        if self._task is not None or not self._waiting or not now:
             return
         scene, stroke, reason, done = wish = self._waiting[0]
         view = around(scene, stroke, self._context.session.view)
         if view is None:
             del self._waiting[0]
             return
-        frame = self._context.feed.frame(scene, view)
+        frame = self._context.feed.frame(scene, view, moving=True)  # as exact as in the hand
 
-        def work(job: Job) -> Picture | None:
+        def work(job: Job) -> _Kept | None:
             try:
                 other = reason.edit(scene)
             except EditError:  # the scene has changed too much since
                 return None
-            return self._shade(dataclasses.replace(frame, scene=other), job)
+            return _Kept(reason, other, view, self._shade(dataclasses.replace(frame, scene=other), job))
 
-        def ended(found: Picture | None) -> None:
+        def ended(found: _Kept | None) -> None:
             self._task = None
             if wish in self._waiting and (found is not None or not cancelled()):
                 self._waiting.remove(wish)
             if found is not None:
-                done(found)
-            self._follow()
+                self._kept = dict([*self._kept.items(), (id(reason), found)][-_KEPT:])
+                done(found.picture)
+            self.follow()
 
         def cancelled() -> bool:
             return task.job.cancelled
@@ -121,6 +141,24 @@ class Sketches(QObject):
         self._before = frame
         made: Picture = self._pipeline.update(frame, changes, job)
         return made
+
+
+@dataclass(frozen=True, eq=False)
+class _Kept:
+    """A picture, the reason it is of, and what it shows from where."""
+
+    reason: Reason
+    scene: Scene
+    view: View
+    picture: Picture
+
+    def shows(self, scene: Scene, view: View | None) -> bool:
+        """Whether it would look the same again."""
+        try:
+            changes = diff(self.scene, self.reason.edit(scene))
+        except EditError:
+            return False
+        return view == self.view and not changes.aspects & ~Aspect.NAME
 
 
 def around(scene: Scene, stroke: NodeId, view: View) -> View | None:

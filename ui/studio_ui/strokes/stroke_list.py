@@ -15,7 +15,7 @@ from studio_ui.look.theme import Theme
 
 _NAME, _WEIGHT = 0, 1
 _ROW = 26  # pixels
-_LEAST, _MOST = 2, 7  # rows before it scrolls
+_LEAST, _MOST = 1, 7  # rows before it scrolls
 _ROLE = Qt.ItemDataRole.UserRole
 
 

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import html
 from collections.abc import Callable, Mapping
 from functools import partial
 
 import numpy as np
 from PySide6.QtCore import QSize, Qt
-from PySide6.QtGui import QIcon, QImage, QPixmap
-from PySide6.QtWidgets import QGridLayout, QLabel, QToolButton, QVBoxLayout, QWidget
+from PySide6.QtGui import QIcon, QImage, QPalette, QPixmap
+from PySide6.QtWidgets import QGridLayout, QLabel, QSizePolicy, QToolButton, QVBoxLayout, QWidget
 
 from studio_core.errors import EditError, PluginError
 from studio_core.kernels.tonemap import tonemap
@@ -18,15 +19,18 @@ from studio_core.scene.nodes import MeshObject, Scene
 from studio_core.shading.artifacts import Picture
 from studio_core.strokes.solution import Finding, Reason, Solution
 from studio_core.strokes.stroke import AUTOMATIC, Stroke
+from studio_ui.forms.colour_button import to_display
 from studio_ui.look.role import set_role
 from studio_ui.look.theme import GAP
 from studio_ui.panels.panel import clear, note
 from studio_ui.strokes.sketches import HEIGHT, WIDTH, Sketches
-from studio_ui.strokes.words import changed, explained, sentence, silence
+from studio_ui.strokes.words import changed, explained, nothing_found, number, place, sentence, silence
 
 _CARDS = 4
 """Reasons that are shown as pictures, the chosen one among them."""
 _COLUMNS = 2
+_NOTHING = 0.01
+"""Of a stroke: what explains no more than that is no reason."""
 
 
 class Why(QWidget):
@@ -39,6 +43,7 @@ class Why(QWidget):
         self.lines: list[QLabel] = []
         self.cards: list[QToolButton] = []
         self._host, self._sketches = host, sketches
+        self._shown: tuple[object, ...] = ()
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)
         column.setSpacing(GAP)
@@ -57,15 +62,24 @@ class Why(QWidget):
         self, scene: Scene, stroke: Stroke, findings: tuple[Finding, ...], solution: Solution
     ) -> None:
         """What a stroke of a scene was found to mean."""
+        if self._shown and all(a is b for a, b in zip(self._shown, (scene, stroke, solution), strict=True)):
+            return
         self._empty()
-        self.told.setVisible(not findings)
-        self.told.setText("" if solution.notes else "Nothing was found to change.")
+        self._shown = (scene, stroke, solution)
+        self.told.setVisible(not findings and not solution.notes)
+        self.told.setText(nothing_found(stroke))
+        set_role(self.told, "dim")
         for finding in findings:
             chosen = chosen_reason(stroke, finding)
-            line = _line(sentence(scene, finding, chosen, self._change(scene, finding, chosen)))
+            where, change = place(scene, finding.node, finding.slot), self._change(scene, finding, chosen)
+            told, shown = (change(how) for how in (number, swatch))
+            line = _line(sentence(html.escape(where), chosen, shown))
+            line.setTextFormat(Qt.TextFormat.RichText)
+            line.setAccessibleName(sentence(where, chosen, told))
+            line.setToolTip(told)
             self.lines.append(line)
             self._rest.addWidget(line)
-            if chosen.meaning:
+            if chosen.meaning or finding.close:
                 self._add_cards(scene, stroke, finding)
             silent = silence(finding)
             if silent:
@@ -78,6 +92,7 @@ class Why(QWidget):
 
     def _empty(self) -> None:
         self._sketches.forget()
+        self._shown = ()
         self.cards, self.lines = [], []
         self.told.show()
         while self._rest.count():
@@ -90,15 +105,16 @@ class Why(QWidget):
                 widget.deleteLater()
 
     def _add_cards(self, scene: Scene, stroke: Stroke, finding: Finding) -> None:
-        if len(finding.reasons) < 2:
+        current = chosen_reason(stroke, finding)
+        shown = worth_showing(finding, current)
+        if len(shown) < 2:
             return
         grid = QGridLayout()
         grid.setSpacing(GAP)
         self._rest.addLayout(grid)
-        current = chosen_reason(stroke, finding)
-        for number, reason in enumerate(finding.reasons[:_CARDS]):
+        for at, reason in enumerate(shown):
             card = self._card(scene, finding, reason, chosen=reason is current)
-            grid.addWidget(card, number // _COLUMNS, number % _COLUMNS)
+            grid.addWidget(card, at // _COLUMNS, at % _COLUMNS)
             self.cards.append(card)
             self._sketches.want(scene, stroke.id, reason, partial(self._drawn, card))
 
@@ -108,13 +124,14 @@ class Why(QWidget):
         card.setIconSize(QSize(WIDTH, HEIGHT))
         card.setCheckable(True)
         card.setChecked(chosen)
+        card.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
         blank = QPixmap(WIDTH, HEIGHT)
-        blank.fill(Qt.GlobalColor.transparent)
+        blank.fill(self.palette().color(QPalette.ColorRole.Base))
         card.setIcon(QIcon(blank))
         name = reason.meaning or "no change"
         share = 100 * min(max(reason.explained, 0.0), 1.0)
         card.setText(f"{name}  {share:.0f} %")
-        change = self._change(scene, finding, reason)
+        change = self._change(scene, finding, reason)(number)
         tip = f"{change}\n{explained(reason)}" if change else explained(reason)
         card.setToolTip(f"{tip}\nThis is it now" if chosen else f"{tip}\nClick to take it instead")
         card.setAccessibleName(f"Explain by {name}")
@@ -130,20 +147,33 @@ class Why(QWidget):
         image = QImage(pixels.data, width, height, 3 * width, QImage.Format.Format_RGB888)
         card.setIcon(QIcon(QPixmap.fromImage(image.copy())))
 
-    def _change(self, scene: Scene, finding: Finding, reason: Reason) -> str:
-        """Which parameters differ, in the words of the material's own form."""
+    def _change(
+        self, scene: Scene, finding: Finding, reason: Reason
+    ) -> Callable[[Callable[[object], str]], str]:
+        """Which parameters differ, in the words of the material's own form; values as one shows them."""
         try:
             after = reason.edit(scene)
             node = after.nodes[finding.node]
             if not isinstance(node, MeshObject):
-                return ""
+                return _nothing
             material = after.material(node.materials[finding.slot])
             params = self._host.brdf(material.model).Params
         except (EditError, PluginError, KeyError, IndexError):
-            return ""
+            return _nothing
         before: Mapping[str, object] = {**defaults(params), **material.values}
         labels = {name: info.label for name, info in param_infos(params).items()}
-        return changed(before, labels, reason)
+        return partial(changed, before, labels, reason)
+
+
+def swatch(value: object) -> str:
+    """A colour as a patch of it; numbers as they are."""
+    if not isinstance(value, tuple):
+        return number(value)
+    return f'<span style="background-color: {to_display(value).name()}">{"&nbsp;" * 5}</span>'
+
+
+def _nothing(shown: Callable[[object], str]) -> str:
+    return ""
 
 
 def _line(text: str) -> QLabel:
@@ -151,6 +181,12 @@ def _line(text: str) -> QLabel:
     made.setWordWrap(True)
     made.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
     return made
+
+
+def worth_showing(finding: Finding, current: Reason) -> list[Reason]:
+    """Reasons that explain something, to change nothing, and the one that holds now."""
+    made = [r for r in finding.reasons if not r.meaning or r.explained > _NOTHING or r is current]
+    return made[:_CARDS]
 
 
 def chosen_reason(stroke: Stroke, finding: Finding) -> Reason:
@@ -165,4 +201,4 @@ def chosen_reason(stroke: Stroke, finding: Finding) -> Reason:
     )
 
 
-__all__ = ["Why", "chosen_reason"]
+__all__ = ["Why", "chosen_reason", "swatch", "worth_showing"]

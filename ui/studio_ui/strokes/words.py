@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 
 from studio_core.scene.nodes import MeshObject, NodeId, Scene
 from studio_core.strokes.solution import Finding, Reason
@@ -15,6 +15,7 @@ from studio_core.strokes.stroke import (
     REPLACE,
     SHARPEN,
     SMEAR,
+    Stroke,
 )
 
 TOOLS: Mapping[str, tuple[str, str, str, str]] = {
@@ -37,9 +38,9 @@ def painted_on(scene: Scene, objects: Iterable[NodeId]) -> str:
     tops = {}
     for node in objects:
         if node in scene.nodes:
-            above = list(scene.ancestors(node))
-            top = above[-1] if above else scene[node]
-            tops[top.id] = top.name
+            line = [scene[node], *scene.ancestors(node)]
+            loose = [one for one in line if not one.locked] or line[:1]  # of a room that is fixed, its part
+            tops[loose[-1].id] = loose[-1].name
     if len(tops) == 1:
         return next(iter(tops.values()))
     return f"{len(tops)} things" if tops else "nothing"
@@ -64,25 +65,48 @@ def explained(reason: Reason) -> str:
     return f"explains {100 * share:.0f} % of the stroke"
 
 
-def changed(before: Mapping[str, object], labels: Mapping[str, str], reason: Reason) -> str:
+def number(value: object) -> str:
+    """Of a parameter."""
+    if isinstance(value, tuple):
+        return " ".join(f"{float(part):.2f}" for part in value)
+    return f"{float(value):.3g}" if isinstance(value, int | float) else str(value)
+
+
+def changed(
+    before: Mapping[str, object],
+    labels: Mapping[str, str],
+    reason: Reason,
+    shown: Callable[[object], str] = number,
+) -> str:
     """`shine 0.04 → 0.35`: what differs from the values before, the largest change first."""
     told = []
     for name, value in reason.values.items():
         old = before.get(name)
         if old is None or _apart(old, value) > 2e-3:
-            was = "" if old is None else f"{_number(old)} → "
+            was = "" if old is None else f"{shown(old)} → "
             far = 1e9 if old is None else _apart(old, value)
-            told.append((far, f"{labels.get(name, name).lower()} {was}{_number(value)}"))
+            told.append((far, f"{labels.get(name, name).lower()} {was}{shown(value)}"))
     told.sort(key=lambda one: -one[0])
     return ", ".join(text for _, text in told[:_MOST])
 
 
-def sentence(scene: Scene, finding: Finding, reason: Reason, change: str) -> str:
+def sentence(where: str, reason: Reason, change: str) -> str:
     """`Chair · Seat: shine 0.04 → 0.35, explains 93 % of the stroke`."""
-    where = place(scene, finding.node, finding.slot)
     if not reason.meaning:
         return f"{where}: {_NOTHING}"
     return f"{where}: {change or reason.meaning}, {explained(reason)}"
+
+
+def nothing_found(stroke: Stroke) -> str:
+    """Where a stroke has no explanation at all."""
+    if stroke.tool == FIXATE:
+        return "What is here stays, as far as other strokes allow."
+    if stroke.indirect:
+        return (
+            "Nothing that lights this place, or shows in it, can make it look so. A colour nearer to what "
+            "is seen there may do, or the surface itself."
+        )
+    return "Nothing was found to change."
 
 
 def silence(finding: Finding) -> str:
@@ -101,10 +125,6 @@ def _apart(one: object, other: object) -> float:
     return max(abs(float(x) - float(y)) for x, y in zip(a, b, strict=True))
 
 
-def _number(value: object) -> str:
-    if isinstance(value, tuple):
-        return " ".join(f"{float(part):.2f}" for part in value)
-    return f"{float(value):.3g}" if isinstance(value, int | float) else str(value)
-
-
-__all__ = ["TOOLS", "changed", "explained", "painted_on", "place", "sentence", "silence"]
+__all__ = [
+    "TOOLS", "changed", "explained", "nothing_found", "number", "painted_on", "place", "sentence", "silence",
+]  # fmt: skip
