@@ -14,6 +14,7 @@ from studio.headless import Headless
 IN_PARTS = True
 PARTS = (
     ("studio.bench.strokes_recovery", "run"),
+    ("studio.bench.strokes_mitsuba", "run"),
     ("studio.bench.strokes_equations", "run"),
     ("studio.bench.strokes_indirect", "run"),
     ("studio.bench.strokes_size", "run"),

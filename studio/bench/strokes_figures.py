@@ -30,7 +30,7 @@ from studio_core.strokes.tools import Seen, wanted
 F32 = npt.NDArray[np.float32]
 F64 = npt.NDArray[np.float64]
 
-SIZE, QUICK_SIZE = (400, 300), (160, 120)
+SIZE, QUICK_SIZE = (400, 300), (320, 240)
 QUALITY: Mapping[str, object] = {"vertices": 20_000, "pixel_lamps": True}
 QUICK_QUALITY: Mapping[str, object] = {**QUALITY, "vertices": 1000, "directions": "2048", "refine": False}
 QUICK_TOLERANCE, TOLERANCE = 6.0, 3.0

@@ -3,8 +3,7 @@
 Cases are joint/indirect/STROKE/NOISE/PARAMETER. What is painted is the light after the change (`shape`) or
 its mean (`flat`), at vertices; NOISE is normal, of the RMS of the change that is painted, which is 0.3 % of
 the light or more. `right_parameter` is the share of trials whose first finding is that object with that
-parameter and no other; `value_error` is as in `strokes_recovery`; `told` is the share of those that are not
-right in which the right object and parameter is among the other reasons.
+parameter and no other; `value_error` and `offered` are as in `strokes_recovery`.
 """
 
 from __future__ import annotations
@@ -42,23 +41,19 @@ def run(report: Report, program: Headless) -> None:
         return
     solver = program.registry.get(KIND, SOLVER)
     run = solver.open(program.services)
-    tallies = {case: (Tally(), list[bool]()) for case in wanted}
+    tallies = {case: Tally() for case in wanted}
     for number, found in enumerate(trials(QUICK_TRIALS if report.quick else TRIALS, program, roles)):
         for case, (kind, noise, role) in wanted.items():
             if role not in found:
                 continue
-            one, (tally, told) = found[role], tallies[case]
+            one = found[role]
             scene = Add((painted(one, kind, noise, number),))(one.scene)
             solution = run.solve(scene, ["stroke-indirect"], one.lit, solver.Params(), Job("Trial"))
             right, error = judged(solution, one.change, program)
-            tally.add((right, error))
-            if not right:
-                told.append(is_told(solution, one.change))
-    for case, (tally, told) in tallies.items():
+            tallies[case].add((right, error), right or is_told(solution, one.change))
+    for case, tally in tallies.items():
         if tally.right:
             tally.tell(report, case)
-        if told:
-            report.add(case, "told", float(np.mean(told)), "1")
     report.keep()
 
 

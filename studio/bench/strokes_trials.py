@@ -59,6 +59,7 @@ class Trial:
     scene: Scene
     node: NodeId
     slot: int
+    views: tuple[View, ...]
     before: tuple[Picture, ...]
     after: Mapping[str, tuple[Picture, ...]]
     truth: Mapping[str, tuple[Mapping[str, Value], frozenset[str]]]
@@ -129,7 +130,7 @@ def trial(scene: Scene, views: int, rng: np.random.Generator, program: Headless)
             for name, (then, _) in truth.items()
         }
         before = tuple(easel.picture(start, look, job) for look in looks)
-        return Trial(start, node, slot, before, after, truth, easel.lit())
+        return Trial(start, node, slot, tuple(looks), before, after, truth, easel.lit())
     return None
 
 

@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from studio_plugins.slf.changeable import DIFFUSE, GLOSS, SPECULAR, Look, Region
+from studio_plugins.slf.changeable import DIFFUSE, GLOSS, SPECULAR, Changeable, Look
 from studio_plugins.slf.fixates import Rows
 from studio_plugins.slf.influence import Columns
 from studio_plugins.slf.joint import CLOSE, NOISE, PLACES, TINTS_APART
@@ -142,7 +142,7 @@ def _between_nodes(sides: Sequence[Columns], region: int, at: Sequence[Between])
 
 
 def candidates(
-    rows: Rows, nodes: list[Node], regions: list[Region], allowed: frozenset[str]
+    rows: Rows, nodes: list[Node], regions: list[Changeable], allowed: frozenset[str]
 ) -> list[Candidate]:
     """The best change of each kind of each region, best first; `allowed` meanings."""
     made: list[Candidate] = []
@@ -153,7 +153,7 @@ def candidates(
 
 
 def fitted_again(
-    one: Candidate, made: Sequence[F64], rows: Rows, nodes: list[Node], region: Region
+    one: Candidate, made: Sequence[F64], rows: Rows, nodes: list[Node], region: Changeable
 ) -> Candidate:
     """A candidate whose change was carried forward, made (P, 3) for each set of rays, in place of columns."""
     off = [then - now for then, now in zip(made, one.predicted(nodes), strict=True)]
@@ -164,7 +164,7 @@ def fitted_again(
 
 
 def _of_region(
-    number: int, region: Region, rows: Rows, nodes: list[Node], off: Sequence[F64] = ()
+    number: int, region: Changeable, rows: Rows, nodes: list[Node], off: Sequence[F64] = ()
 ) -> Iterator[Candidate]:
     own = Moments.of(rows, nodes[:1], number, NOW, off)
     yield from _colours(number, region, own)
@@ -175,7 +175,7 @@ def _of_region(
 
 
 def _glosses(
-    number: int, region: Region, rows: Rows, nodes: list[Node], off: Sequence[F64]
+    number: int, region: Changeable, rows: Rows, nodes: list[Node], off: Sequence[F64]
 ) -> Iterator[Candidate]:
     """Changes to levels other than today's, if the region shines at all today."""
     full, at = region.full, _between(region, nodes)
@@ -193,7 +193,7 @@ def _glosses(
         yield from _shine(number, full, levels, at)
 
 
-def _between(region: Region, nodes: list[Node]) -> list[Between]:
+def _between(region: Changeable, nodes: list[Node]) -> list[Between]:
     """Levels that are tried, each between two nodes: those with columns of their own, and PARTS between them.
 
     A region whose model stays has a node at its own level as well; levels near that are no change.
@@ -224,7 +224,7 @@ def score_of(left: float, numbers: int, size: float) -> float:
     return PLACES * math.log(max(left, 0) + NOISE**2) + numbers * math.log(PLACES) + SIZE * size
 
 
-def _colours(number: int, region: Region, own: Moments) -> Iterator[Candidate]:
+def _colours(number: int, region: Changeable, own: Moments) -> Iterator[Candidate]:
     look = region.now
     if DIFFUSE not in look.roles or look.at(DIFFUSE).ndim == 0:
         return

@@ -126,7 +126,7 @@ class Look:
 
 
 @dataclass(frozen=True, eq=False)
-class Region:
+class Changeable:
     """One slot of an object: its look `now`, and the same in a model that has all roles, where there is one.
 
     `material` is in that model what the object's material is without paint.
@@ -144,16 +144,16 @@ class Region:
         return self.node, self.slot
 
 
-def regions_of(
+def changeables_of(
     scene: Scene,
     surfaces: Surfaces,
     without: Sequence[tuple[NodeId, int]],
     registry: Registry,
-) -> tuple[list[Region], I32]:
+) -> tuple[list[Changeable], I32]:
     """All but some and those without any role, and the number of each vertex' one (V,), −1: none."""
     mesh = surfaces.mesh
     number = np.full(len(mesh), -1, np.int32)
-    made: list[Region] = []
+    made: list[Changeable] = []
     for index, placed in enumerate(mesh.objects):
         node, own = scene.nodes.get(placed.node), mesh.vertices_of(index)
         if not isinstance(node, MeshObject):
@@ -169,13 +169,13 @@ def regions_of(
     return made, number
 
 
-def _region(scene: Scene, node: MeshObject, slot: int, registry: Registry) -> Region:
+def _region(scene: Scene, node: MeshObject, slot: int, registry: Registry) -> Changeable:
     material = scene.material(node.materials[slot])
     changes = mean_paint(node.paint, slot)
     now = Look.of(material, changes, registry)
     other = paintable(now.material, registry)
     full = now if other.model == material.model else Look.of(other, {}, registry)
-    return Region(node.id, slot, now, full, paintable(material, registry))
+    return Changeable(node.id, slot, now, full, paintable(material, registry))
 
 
 def mean_paint(paint: Paint | None, slot: int) -> dict[str, F64]:
@@ -200,4 +200,4 @@ def _value(made: npt.NDArray[Any]) -> Value:
     return (red, green, blue)
 
 
-__all__ = ["DIFFUSE", "GLOSS", "SPECULAR", "Look", "Region", "mean_paint", "regions_of"]
+__all__ = ["DIFFUSE", "GLOSS", "SPECULAR", "Changeable", "Look", "changeables_of", "mean_paint"]

@@ -15,7 +15,7 @@ from studio_core.strokes.marks import Marks
 from studio_core.strokes.paintable import paintable
 from studio_core.strokes.stroke import AUTOMATIC, FIXATE, Stroke
 from studio_plugins.slf.dressed import Dressed
-from studio_plugins.slf.joint import NOISE, SINGLE, Change, Verdict
+from studio_plugins.slf.joint import NOISE, SINGLE, Change, Verdict, decide
 from studio_plugins.slf.places import Places
 from studio_plugins.slf.regions import Region
 from studio_plugins.slf.samples import F64, Reflectance, Samples
@@ -35,6 +35,8 @@ STRANGE = 0.15
 """Relative error of a place's light as it is, from which on it says little of how it would change."""
 NOISE_OF_ONE_LIGHT = 0.05
 """As `joint.NOISE`, of one flat colour."""
+ENOUGH = 0.9
+"""What explains so much of a flat colour may be it, without another tint of the shine."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -158,14 +160,26 @@ def meant_first(verdict: Verdict, dressed: Dressed, strokes: Sequence[Stroke]) -
     return verdict
 
 
-def tints_of(
-    samples: Samples, dressed: Dressed, now: Reflectance, strokes: Sequence[Stroke]
-) -> tuple[F64, ...]:
-    """White, and the colour in which the shine would have what was painted.
+def explained(
+    samples: Samples, dressed: Dressed, now: Reflectance, strokes: Sequence[Stroke], coloured: bool
+) -> Verdict:
+    """How strokes are explained; with `coloured` the shine may take the colour that was painted.
 
-    None for one flat colour beside a matte part, which could have it as well.
+    One flat colour could be that of the matte part as well: there the shine keeps its own, unless so much is
+    left over that neither can be it.
     """
-    if dressed.white or (one_light(strokes) and Change.DIFFUSE in dressed.can):
+    allowed, exactness = allowed_of(dressed, strokes), exactness_of(strokes)
+    plain = one_light(strokes) and Change.DIFFUSE in dressed.can
+    if plain or not coloured:
+        verdict = decide(samples, dressed, now, allowed, (), exactness)
+        if not coloured or verdict.best.explained > ENOUGH:
+            return verdict
+    return decide(samples, dressed, now, allowed, tints_of(samples, dressed, now), exactness)
+
+
+def tints_of(samples: Samples, dressed: Dressed, now: Reflectance) -> tuple[F64, ...]:
+    """White, and the colour in which the shine would have what was painted."""
+    if dressed.white:
         return ()
     more = samples.wanted - samples.before
     full = Reflectance(now.diffuse, np.ones(3), now.level)
@@ -182,11 +196,9 @@ __all__ = [
     "WORDS",
     "Painting",
     "Step",
-    "allowed_of",
-    "exactness_of",
+    "explained",
     "meant_first",
     "on_region",
     "pooled_of",
     "samples_of",
-    "tints_of",
 ]

@@ -21,7 +21,7 @@ from studio_core.transport.bounces import Light, Surface, bounced, reflected, se
 from studio_core.transport.exchange import Exchange
 from studio_core.transport.separable import Separator
 from studio_plugins.slf.candidates import Candidate
-from studio_plugins.slf.changeable import GLOSS, Region
+from studio_plugins.slf.changeable import GLOSS, Changeable
 from studio_plugins.slf.influence import Sight
 
 F32 = npt.NDArray[np.float32]
@@ -54,9 +54,11 @@ class Forward:
             now = self._settled(Light(irradiance.copy(), functions.copy()), known.surface)
         self._now = self._seen(now, known.surface)
 
-    def __call__(self, one: Candidate, region: Region, own: npt.NDArray[np.bool_], looks: F32) -> list[F64]:
+    def __call__(
+        self, one: Candidate, region: Changeable, own: npt.NDArray[np.bool_], looks: F32
+    ) -> list[F64]:
         """(P, 3) for each set of rays: how the rows' light changes with a candidate's material on vertices
-        own (V,); `looks` (V, T, 3) are coefficients in the models of `Region.full`.
+        own (V,); `looks` (V, T, 3) are coefficients in the models of `Changeable.full`.
         """
         known = self._known
         surface, straight = known.surface, self._straight

@@ -12,7 +12,7 @@ from studio_core.edits import Add, Assign, Compound, Edit, SetPaint
 from studio_core.scene.geometry import Geometry
 from studio_core.scene.nodes import MeshObject, Scene, new_id
 from studio_core.scene.paint import Paint
-from studio_plugins.slf.changeable import Look, Region
+from studio_plugins.slf.changeable import Changeable, Look
 
 F64 = npt.NDArray[np.float64]
 LABEL = "Paint what is reflected"
@@ -20,7 +20,7 @@ POINTS = 64
 """Places at which paint lies that is the same everywhere: others may be painted between them."""
 
 
-def edit_of(scene: Scene, region: Region, look: Look, values: Mapping[str, F64]) -> Edit:
+def edit_of(scene: Scene, region: Changeable, look: Look, values: Mapping[str, F64]) -> Edit:
     """Paint on one slot that gives it these values by role, in a model that has them."""
     node = scene[region.node]
     assert isinstance(node, MeshObject)

@@ -22,7 +22,7 @@ from studio_core.shading.job import Job
 from studio_core.strokes.solution import Finding, Lit, Reason
 from studio_core.strokes.stroke import AUTOMATIC, FIXATE, MEANINGS, Stroke
 from studio_plugins.slf.candidates import Candidate, candidates, fitted_again, score_of
-from studio_plugins.slf.changeable import Region, regions_of
+from studio_plugins.slf.changeable import Changeable, changeables_of
 from studio_plugins.slf.fixates import NOBODY, Rows, rows_of
 from studio_plugins.slf.forward import Forward
 from studio_plugins.slf.influence import SIDES, Sights
@@ -79,7 +79,7 @@ class Reflected:
         resting = lit.indirect is not None and lit.indirect.final
         sights = self._sights.of(scene, surfaces, lit.casters, known, rows, job, SIDES if resting else 1)
         own = [(surfaces.nodes[i], s) for i, s in _under(rows, surfaces.mesh)]
-        regions, region = regions_of(scene, surfaces, own, self._services.registry)
+        regions, region = changeables_of(scene, surfaces, own, self._services.registry)
         if not regions:
             return Reflections(notes=("Nothing whose material could change lights the stroke.",))
         nodes = self._trials(scene, surfaces, known, rows, sights, regions, region, job)
@@ -102,7 +102,7 @@ class Reflected:
         return Reflections(self._findings(scene, asked, regions, found), (), counts)
 
     def _findings(
-        self, scene: Scene, strokes: Sequence[Stroke], regions: list[Region], found: list[Candidate]
+        self, scene: Scene, strokes: Sequence[Stroke], regions: list[Changeable], found: list[Candidate]
     ) -> tuple[Finding, ...]:
         nothing = score_of(1.0, 0, 0.0)
         better = [one for one in found if one.score < nothing]
@@ -118,7 +118,7 @@ class Reflected:
             made.append(Finding(region.node, region.slot, ids, reasons, close if not made else 0))
         return tuple(made)
 
-    def _reason(self, scene: Scene, region: Region, one: Candidate) -> Reason:
+    def _reason(self, scene: Scene, region: Changeable, one: Candidate) -> Reason:
         values: dict[str, float | tuple[float, float, float]] = {}
         for role, value in one.values.items():
             numbers = [float(v) for v in np.atleast_1d(value)]

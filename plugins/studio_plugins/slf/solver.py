@@ -29,16 +29,13 @@ from studio_plugins.slf.dressed import Dressed
 from studio_plugins.slf.explaining import (
     Painting,
     Step,
-    allowed_of,
-    exactness_of,
+    explained,
     meant_first,
     on_region,
     pooled_of,
     samples_of,
-    tints_of,
 )
 from studio_plugins.slf.incident import Incident
-from studio_plugins.slf.joint import decide
 from studio_plugins.slf.outcome import Canvas, finding_of, label_of, told
 from studio_plugins.slf.places import Places, places_of
 from studio_plugins.slf.reflected import Reflected
@@ -211,10 +208,7 @@ class JointRun:
         if said is None:
             return
         dressed, parts = painting.dressed, said.parts
-        pooled = pooled_of(parts)
-        allowed = allowed_of(dressed, said.strokes)
-        tints = tints_of(pooled, dressed, said.now, said.strokes) if params.coloured else ()
-        verdict = decide(pooled, dressed, said.now, allowed, tints, exactness_of(said.strokes))
+        verdict = explained(pooled_of(parts), dressed, said.now, said.strokes, params.coloured)
         verdict = meant_first(verdict, dressed, group)
         painting.take(Step(said.strokes, verdict, said.now, said.gloss, said.count))
 

@@ -26,7 +26,7 @@ from studio_core.shading.job import Job
 from studio_core.shading.materials import scalar
 from studio_core.shading.painting import Coat, Coats
 from studio_core.strokes.solution import Lit, Solution
-from studio_core.strokes.solved import Solved as Painted
+from studio_core.strokes.solved import Solved
 from studio_core.transport.cells import CELLS, PARTS, RINGS, cell_directions, cell_of
 from studio_core.transport.reflectance import VertexCoefficients
 from studio_plugins.slf.appearance import Appearance
@@ -34,7 +34,7 @@ from studio_plugins.slf.dressed import Dressed
 from studio_plugins.slf.elements import ALIKE
 from studio_plugins.slf.lumitexels import LightField
 from studio_plugins.slf.series import series_of
-from studio_plugins.slf.whole import Reflectances, Solved, Wanted, Whole
+from studio_plugins.slf.whole import Answer, Reflectances, Wanted, Whole
 
 F32 = npt.NDArray[np.float32]
 F64 = npt.NDArray[np.float64]
@@ -74,7 +74,7 @@ def stylise(
     wanted = unsharp(whole, whole.bounced(now, dark, job), neighbours(mesh, at), style.amount)
     made = whole.solve(wanted, now, dark, style.solver, job)  # type: ignore[arg-type]
     paints, notes = _paints(scene, mesh, at, now, made, services)
-    return Solution(Painted("Stylise", paints), (), notes, made.counts)
+    return Solution(Solved("Stylise", paints), (), notes, made.counts)
 
 
 def neighbours(mesh: WorldMesh, vertices: I64) -> I32:
@@ -122,7 +122,7 @@ def across(start: int, frames: F32, other: I32, directions: F32, rows: U32) -> N
 
 
 def _paints(
-    scene: Scene, mesh: WorldMesh, at: I64, now: Reflectances, made: Solved, services: Services
+    scene: Scene, mesh: WorldMesh, at: I64, now: Reflectances, made: Answer, services: Services
 ) -> tuple[Mapping[NodeId, Paint | None], tuple[str, ...]]:
     paints: dict[NodeId, Paint | None] = {}
     notes: list[str] = []

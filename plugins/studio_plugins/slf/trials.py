@@ -17,7 +17,7 @@ from studio_core.strokes.paintable import paintable
 from studio_core.transport.exchange import Exchange
 from studio_core.transport.reflectance import VertexCoefficients
 from studio_core.transport.separable import Separator
-from studio_plugins.slf.changeable import GLOSS, Region
+from studio_plugins.slf.changeable import GLOSS, Changeable
 from studio_plugins.slf.fixates import Rows
 from studio_plugins.slf.further import Importance, term_albedos
 from studio_plugins.slf.influence import Columns, Sight, columns
@@ -62,7 +62,7 @@ class Trials:
         known: Exchange,
         rows: Rows,
         sights: Sequence[Sight],
-        regions: list[Region],
+        regions: list[Changeable],
         region: I32,
         job: Job,
     ) -> list[Node]:
@@ -98,7 +98,7 @@ class Trials:
         return self._coefficients(scene.with_materials(*other), surfaces)
 
 
-def _shapes(regions: list[Region], glossy: list[int]) -> Shapes:
+def _shapes(regions: list[Changeable], glossy: list[int]) -> Shapes:
     """Rows of the tried levels of each region with a gloss, one region after the other."""
     address, terms, offset, data, length = [], [], [], [], 0
     for number in glossy:

@@ -59,7 +59,7 @@ class Reflectances:
 
 
 @dataclass(frozen=True, eq=False)
-class Solved:
+class Answer:
     """What a solve found; kind (E,) as in `paper`, flagged (E,) elements that stay as they are."""
 
     reflectances: Reflectances
@@ -203,7 +203,7 @@ class Whole:
         field: LightField,
         solver: Solver = "mixed",
         job: Checkpoints | None = None,
-    ) -> Solved:
+    ) -> Answer:
         """Reflectances of all elements that send what is wanted of what `field` sends to them.
 
         `dark()` as the field is the paper's one bounce.
@@ -226,7 +226,7 @@ class Whole:
         self._workers.run(count, CHUNK, body, job)
         made[flagged] = both[flagged]
         real = np.where(flagged | (gloss == level), now.level, gloss)
-        return Solved(Reflectances(made[..., 0], made[..., 1], real), kind, residual, flagged)
+        return Answer(Reflectances(made[..., 0], made[..., 1], real), kind, residual, flagged)
 
     def settled(
         self,
@@ -235,13 +235,13 @@ class Whole:
         bounces: int,
         solver: Solver = "mixed",
         job: Checkpoints | None = None,
-    ) -> list[Solved]:
+    ) -> list[Answer]:
         """Listing 1: solved again under the light of what was found, as often as light is to bounce."""
-        field, made = self.dark(), list[Solved]()
+        field, made = self.dark(), list[Answer]()
         for _ in range(max(bounces, 1)):
             made.append(self.solve(wanted, now, field, solver, job))
             field = self.bounced(made[-1].reflectances, field, job)
         return made
 
 
-__all__ = ["WIDTH", "Reflectances", "Solved", "Wanted", "Whole"]
+__all__ = ["WIDTH", "Answer", "Reflectances", "Wanted", "Whole"]

@@ -15,7 +15,7 @@ from studio_core.scene.transform import looking
 from studio_core.shading.artifacts import Casters, Surfaces
 from studio_core.transport.bounces import sent_towards
 from studio_plugins.slf.candidates import Candidate, fitted_again
-from studio_plugins.slf.changeable import regions_of
+from studio_plugins.slf.changeable import changeables_of
 from studio_plugins.slf.fixates import rows_of
 from studio_plugins.slf.forward import Forward
 from studio_plugins.slf.influence import Sight
@@ -63,7 +63,7 @@ def test_it_is_what_the_gather_makes_of_the_changed_scene(
     some = painting.vertices("floor", (-1.4, 0, 0.3), 60)
     rows = rows_of([painting.stroke(some, painting.radiance(painting.lit, some) + 1)], surfaces)
     sights = painting.solver._sights.of(painting.scene, surfaces, handed[Casters], known, rows, JOB)
-    regions, region = regions_of(painting.scene, surfaces, [], painting.services.registry)
+    regions, region = changeables_of(painting.scene, surfaces, [], painting.services.registry)
     number = [one.node for one in regions].index(node)
     look = regions[number].full if model else regions[number].now
     given = {role: np.asarray(value, np.float64) for role, value in values.items()}
@@ -88,7 +88,7 @@ def test_what_was_carried_forward_is_fitted_in_place_of_columns(painting: Painti
     some = painting.vertices("floor", (-1.4, 0, 0.3), 60)
     rows = rows_of([painting.stroke(some, 1.1 * painting.radiance(painting.lit, some))], surfaces)
     sights = painting.solver._sights.of(painting.scene, surfaces, handed[Casters], known, rows, JOB)
-    regions, region = regions_of(painting.scene, surfaces, [], painting.services.registry)
+    regions, region = changeables_of(painting.scene, surfaces, [], painting.services.registry)
     number = [one.node for one in regions].index("side")
     nodes = painting.solver._trials(painting.scene, surfaces, known, rows, sights, regions, region, JOB)
     one = Candidate(number, "colour", regions[number].now, {"diffuse": np.full(3, 0.9)}, 0.0, 0.0)

@@ -14,7 +14,7 @@ from studio_core.scene.nodes import AreaLamp, Camera, Material
 from studio_core.scene.transform import looking
 from studio_core.shading.artifacts import Casters, Surfaces
 from studio_core.transport.bounces import sent_towards
-from studio_plugins.slf.changeable import Look, regions_of
+from studio_plugins.slf.changeable import Look, changeables_of
 from studio_plugins.slf.fixates import Rows, rows_of
 from studio_plugins.slf.further import Importance, carry_back, groups_of, spread_first, sum_regions
 from studio_plugins.slf.influence import Sight, add_columns
@@ -85,7 +85,7 @@ def test_columns_are_finite_differences(
     registry, surfaces = painting.services.registry, painting.room.handed()[Surfaces]
     known = painting.lit.sent
     before = seen(painting, sights, known)
-    regions, region = regions_of(painting.scene, surfaces, [], registry)
+    regions, region = changeables_of(painting.scene, surfaces, [], registry)
     number = [one.node for one in regions].index(node)
     trials = painting.solver._trials
     nodes = trials(painting.scene, surfaces, known, rows, sights, regions, region, JOB)

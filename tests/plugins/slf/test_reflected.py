@@ -17,7 +17,7 @@ from studio_core.scene.transform import looking
 from studio_core.shading.artifacts import Surfaces
 from studio_core.strokes.solution import Lit
 from studio_plugins.slf.candidates import STEPS, Moments, _refined
-from studio_plugins.slf.changeable import Look, mean_paint, regions_of
+from studio_plugins.slf.changeable import Look, changeables_of, mean_paint
 from studio_plugins.slf.recolouring import painted_alike
 from studio_plugins.slf.reflected import solve_reflected
 
@@ -121,7 +121,7 @@ def test_strokes_that_say_nothing_are_told_of(painting: Painting) -> None:
 
 def test_regions_are_slots_of_objects(painting: Painting) -> None:
     surfaces, registry = painting.room.handed()[Surfaces], painting.services.registry
-    regions, number = regions_of(painting.scene, surfaces, [("floor", 0)], registry)
+    regions, number = changeables_of(painting.scene, surfaces, [("floor", 0)], registry)
     assert {one.name for one in regions} == {("side", 0), ("back", 0), ("box", 0)}
     mesh = surfaces.mesh
     assert (number[mesh.vertices_of(mesh.index_of("floor"))] == -1).all()
