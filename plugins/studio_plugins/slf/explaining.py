@@ -35,7 +35,7 @@ STRANGE = 0.15
 """Relative error of a place's light as it is, from which on it says little of how it would change."""
 NOISE_OF_ONE_LIGHT = 0.05
 """As `joint.NOISE`, of one flat colour."""
-ENOUGH = 0.9
+ENOUGH = 0.75
 """What explains so much of a flat colour may be it, without another tint of the shine."""
 
 
