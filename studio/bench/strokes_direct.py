@@ -34,7 +34,7 @@ from studio_core.strokes.painting import marks_of, stroke_of
 from studio_core.strokes.session import Easel
 from studio_core.strokes.solution import Lit
 from studio_core.strokes.stroke import REPLACE, Stroke
-from studio_plugins.slf import solver
+from studio_plugins.slf import explaining, solver
 from studio_plugins.slf.incident import Incident
 from studio_plugins.slf.solver import JointRun, Params
 from studio_plugins.slf.spread import Spread
@@ -50,7 +50,7 @@ REPEATS, QUICK_REPEATS = 7, 2
 PARTS: dict[str, tuple[Any, str]] = {
     "light": (Incident, "at"),
     "columns": (solver, "sums_at"),
-    "decision": (solver, "decide"),
+    "decision": (explaining, "decide"),
     "laid": (Spread, "__call__"),
 }
 

@@ -6,7 +6,7 @@ import numpy as np
 from plugins.slf.strokes import MODEL, painted, reflectance
 
 from studio.bench.strokes_direct import PARTS, parts
-from studio_plugins.slf import solver
+from studio_plugins.slf import explaining
 
 
 def test_parts_are_timed_and_left_as_they_were():
@@ -14,7 +14,7 @@ def test_parts_are_timed_and_left_as_they_were():
     now = reflectance((0.5, 0.3, 0.2), (0.1, 0.1, 0.1), 8)
     samples = painted(np.random.default_rng(0), now, now)
     with parts() as spent:
-        solver.decide(samples, MODEL, now)
+        explaining.decide(samples, MODEL, now)
     assert spent["decision"] > 0
     assert not any(spent[name] for name in PARTS if name != "decision")
     assert [getattr(owner, attribute) for owner, attribute in PARTS.values()] == originals
