@@ -203,8 +203,9 @@ def report(made: Painted, scene: Scene) -> dict[str, Any]:
             ],
             "close": found.close,
             "cannot_tell": list(found.silent),
+            "instead": found.rivals and before is not None and before.strokes == found.strokes,
         }
-        for found in made.findings
+        for before, found in zip((None, *made.findings), made.findings, strict=False)
     ]
     return {"strokes": strokes, "findings": findings, "notes": list(made.notes), "counts": dict(made.counts)}
 
@@ -217,6 +218,7 @@ def _lines(told: dict[str, Any]) -> list[str]:
             continue
         best = found["reasons"][0]
         line = f"{found['object']}, slot {found['slot']}: {best['meaning']}, explains {best['explained']:.0%}"
+        line = f"or {line}" if found["instead"] else line
         if found["close"]:
             line += f" ({_count(found['close'], 'other')} nearly as well)"
         if found["cannot_tell"]:

@@ -20,7 +20,7 @@ from studio_core.project.canonical import loads
 from studio_core.scene.nodes import Scene
 from studio_core.strokes.brush import Brush
 from studio_core.strokes.json_values import entries, flag, known, numbers, parameter, parameters, vector
-from studio_core.strokes.marks_file import marks_from_json, marks_json
+from studio_core.strokes.marks_file import marks_from_json, marks_json, name_of
 from studio_core.strokes.picking import radiance_of_display
 from studio_core.strokes.planned import Look, MarkedStroke, PaintedStroke, Planned
 from studio_core.strokes.stroke import CLONE, REPLACE, TOOLS, Stroke
@@ -35,10 +35,11 @@ FAR = 10.0
 """How far a path may leave the picture, in parts of it."""
 _REACH = ("near", "facing", "alike")
 _FIELDS = ("name", "indirect", "weight", "meaning", "together", "hidden")
+_THROUGH = "through"
 _LOOK = ("camera", "size", "exposure", "tonemap")
 _SETTINGS = (*param_infos(ToolSettings), "source")
-_PAINTED = ("tool", "brush", "path", "reach", *_FIELDS, *_LOOK, *_SETTINGS)
-_MARKED = ("tool", "marks", "flat", "reach", *_FIELDS)
+_PAINTED = ("tool", "brush", "path", "reach", _THROUGH, *_FIELDS, *_LOOK, *_SETTINGS)
+_MARKED = ("tool", "marks", "flat", "reach", _THROUGH, *_FIELDS)
 _EXPOSURE = ParamInfo("number", "Exposure", low=-64, high=64)
 _ANGLE = ParamInfo("number", "Angle", low=1, high=170)
 _SCREEN = re.compile("#[0-9a-fA-F]{6}")
@@ -80,6 +81,8 @@ def strokes_json(scene: Scene) -> str:
             continue
         told = {name: getattr(stroke, name) for name in ("tool", *_FIELDS, "flat")}
         told["reach"] = {name: getattr(stroke, name) for name in _REACH}
+        if stroke.through in scene.nodes:
+            told[_THROUGH] = name_of(scene, stroke.through)
         lines = [f"  {json.dumps(name)}: {json.dumps(value)}" for name, value in told.items()]
         lines.append(f'  "marks": {marks_json(scene, stroke.objects, stroke.marks)}')
         made.append("{\n" + ",\n".join(lines) + "\n }")
@@ -94,7 +97,10 @@ def _stroke(value: Any, common: Mapping[str, Any], part: str) -> Planned:
         raise InputError(f"{part}: there is no tool {str(tool)[:40]!r}; known: {', '.join(TOOLS)}")
     chosen = {name: told[name] for name in _FIELDS if name in told}
     chosen |= known(told.get("reach", {}), _REACH, f"{part}, reach")
-    fields = frozen_map(parameters(Stroke, chosen, part))
+    through = told.get(_THROUGH, "")
+    if not isinstance(through, str):
+        raise InputError(f"{part}, through: expected the name of an object")
+    fields = frozen_map({**parameters(Stroke, chosen, part), **({_THROUGH: through} if through else {})})
     if not 0 < len(fields.get("name", tool)) <= LONGEST_NAME:
         raise InputError(f"{part}: a name has 1 to {LONGEST_NAME} letters")
     if marked:

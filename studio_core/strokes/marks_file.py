@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 import json
 import math
-from collections import Counter
 from collections.abc import Sequence
 from typing import Any
 
@@ -53,12 +52,8 @@ def marks_from_json(value: Any, part: str) -> tuple[tuple[str, ...], Marks]:
 
 
 def marks_json(scene: Scene, objects: Sequence[NodeId], marks: Marks) -> str:
-    """Objects go by name where that is theirs alone, else by id."""
-    count = Counter(node.name for node in scene.nodes.values())
-    names = []
-    for node in objects:
-        name = scene.nodes[node].name if node in scene.nodes else ""
-        names.append(name if count[name] == 1 and name not in scene.nodes else node)
+    """Objects go by `name_of`."""
+    names = [name_of(scene, node) for node in objects]
     offset = [None if np.isnan(row).any() else _short(row) for row in marks.offset]
     columns: dict[str, Any] = {"objects": names, "object": marks.object.tolist(), "slot": marks.slot.tolist()}
     columns |= {name: [_short(row) for row in getattr(marks, name)] for name in _VECTORS}
@@ -67,8 +62,15 @@ def marks_json(scene: Scene, objects: Sequence[NodeId], marks: Marks) -> str:
     return "{\n" + ",\n".join(lines) + "}"
 
 
+def name_of(scene: Scene, node: NodeId) -> str:
+    """A node's name where that is its alone, else its id."""
+    name = scene.nodes[node].name if node in scene.nodes else ""
+    alone = sum(one.name == name for one in scene.nodes.values()) == 1
+    return name if alone and name not in scene.nodes else node
+
+
 def _short(row: Any) -> list[float]:
     return [float(f"{one:.{_DIGITS}g}") for one in row]
 
 
-__all__ = ["marks_from_json", "marks_json"]
+__all__ = ["marks_from_json", "marks_json", "name_of"]

@@ -117,6 +117,8 @@ def _group(
     for one in planned:
         job.checkpoint()
         fields = {"together": bool(strokes) and not apart, **one.fields}
+        if "through" in fields:
+            fields["through"] = scene.named(fields["through"]).id
         if isinstance(one, MarkedStroke):
             strokes.append(_marked(scene, one, fields))
             continue

@@ -32,7 +32,8 @@ class Finding:
     """What was found for one object's slot: reasons, best first; the first is in the solution's edit.
 
     `close` are how many others are nearly as good; `silent` are meanings of which these strokes cannot tell
-    anything from where they were painted.
+    anything from where they were painted. Of findings that are `rivals` one alone holds: the first of them is
+    in the solution's edit.
     """
 
     node: NodeId
@@ -41,6 +42,7 @@ class Finding:
     reasons: tuple[Reason, ...]
     close: int = 0
     silent: tuple[str, ...] = ()
+    rivals: bool = False
 
 
 @dataclass(frozen=True)

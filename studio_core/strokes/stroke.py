@@ -27,7 +27,8 @@ class Stroke(Node):
     Each is solved on what those before have made, or, `together` with the one before it, as one with that.
     `flat` tells that one colour was painted over everything: then its mean is meant, not its shape. `near`,
     `facing` and `alike` are σ_s, σ_n and σ_r of section 4.3's s(x, y): how the change spreads to similar
-    surface. `reached` are other objects on which it changes something, as last found.
+    surface. `through` is the object that somebody chose to change for a stroke in indirect mode ("": any),
+    and its slot (-1: any). `reached` are other objects on which it changes something, as last found.
     """
 
     tool: str = param(REPLACE, "Tool", choices=TOOLS)
@@ -43,6 +44,8 @@ class Stroke(Node):
     alike: float = param(0.0, "Likeness", "How much only surfaces that look alike do", low=0.0, high=100.0)
     objects: tuple[NodeId, ...] = ()
     table: Table | None = None
+    through: NodeId = ""
+    through_slot: int = -1
     reached: tuple[NodeId, ...] = ()
 
     def __post_init__(self) -> None:

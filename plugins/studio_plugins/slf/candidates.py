@@ -141,15 +141,12 @@ def _between_nodes(sides: Sequence[Columns], region: int, at: Sequence[Between])
     return terms, sent
 
 
-def candidates(
-    rows: Rows, nodes: list[Node], regions: list[Changeable], allowed: frozenset[str]
-) -> list[Candidate]:
-    """The best change of each kind of each region, best first; `allowed` meanings."""
+def candidates(rows: Rows, nodes: list[Node], regions: list[Changeable]) -> list[Candidate]:
+    """The best change of each kind of each region."""
     made: list[Candidate] = []
     for number, region in enumerate(regions):
-        found = _of_region(number, region, rows, nodes)
-        made += _best_of_each(one for one in found if one.meaning in allowed)
-    return sorted(made, key=lambda one: one.score)
+        made += _best_of_each(_of_region(number, region, rows, nodes))
+    return made
 
 
 def fitted_again(

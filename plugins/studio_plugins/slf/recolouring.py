@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
 from studio_core.edits import Add, Assign, Compound, Edit, SetPaint
 from studio_core.scene.geometry import Geometry
-from studio_core.scene.nodes import MeshObject, Scene, new_id
+from studio_core.scene.nodes import MeshObject, NodeId, Scene, new_id
 from studio_core.scene.paint import Paint
+from studio_core.strokes.stroke import Stroke
 from studio_plugins.slf.changeable import Changeable, Look
 
 F64 = npt.NDArray[np.float64]
@@ -34,6 +36,26 @@ def edit_of(scene: Scene, region: Changeable, look: Look, values: Mapping[str, F
     return Compound(
         LABEL, (Add((), (made,)), Assign(node.id, made.id, region.slot), SetPaint(node.id, paint))
     )
+
+
+@dataclass(frozen=True)
+class PutBack:
+    """What strokes changed elsewhere is as in `before` again, so that something else can explain them."""
+
+    strokes: tuple[NodeId, ...]
+    before: Mapping[NodeId, MeshObject]
+    label: str = LABEL
+
+    def __call__(self, scene: Scene) -> Scene:
+        """See `studio_core.edits.Edit`."""
+        for name in self.strokes:
+            stroke = scene[name]
+            for changed in stroke.reached if isinstance(stroke, Stroke) else ():
+                node, then = scene.nodes.get(changed), self.before.get(changed)
+                if then is not None and isinstance(node, MeshObject):
+                    as_then = dataclasses.replace(node, paint=then.paint, materials=then.materials)
+                    scene = scene.with_nodes(as_then)
+        return scene
 
 
 def painted_alike(node: MeshObject, slot: int, changes: Mapping[str, F64], names: Mapping[str, str]) -> Paint:
@@ -80,4 +102,4 @@ def spread_points(geometry: Geometry, slot: int) -> tuple[F64, F64]:
     return corners.mean(axis=1), normals
 
 
-__all__ = ["edit_of", "painted_alike", "spread_points"]
+__all__ = ["PutBack", "edit_of", "painted_alike", "spread_points"]

@@ -9,7 +9,7 @@ is written.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -20,7 +20,7 @@ from studio_core.contract import Services
 from studio_core.scene.nodes import NodeId, Scene
 from studio_core.shading.job import Job
 from studio_core.strokes.solution import Finding, Lit, Reason
-from studio_core.strokes.stroke import AUTOMATIC, FIXATE, MEANINGS, Stroke
+from studio_core.strokes.stroke import AUTOMATIC, FIXATE, Stroke
 from studio_plugins.slf.candidates import Candidate, candidates, fitted_again, score_of
 from studio_plugins.slf.changeable import Changeable, changeables_of
 from studio_plugins.slf.fixates import NOBODY, Rows, rows_of
@@ -85,8 +85,14 @@ class Reflected:
         nodes = self._trials(scene, surfaces, known, rows, sights, regions, region, job)
         pooled, share = _known(rows, nodes[0]).pooled(surfaces.mesh.positions)
         means = [node.pooled(share) for node in nodes]
-        found = candidates(pooled, means, regions, allowed(asked))
-        near = [one for one in found if one.score - found[0].score < NEARLY][: CARRIED if resting else 0]
+        meant = meant_by(asked, scene)
+
+        def rank(one: Candidate) -> tuple[bool, float]:
+            return not meant(regions[one.region], one.meaning), one.score
+
+        found = sorted(candidates(pooled, means, regions), key=rank)
+        nearly = [one for one in found if rank(one) < (rank(found[0])[0], found[0].score + NEARLY)]
+        near = nearly[: CARRIED if resting else 0]
         if near:
             looks = self._trials.looks(scene, surfaces)
             forward = Forward(known, surfaces, sights, self._trials.separator, self._services, job)
@@ -95,27 +101,30 @@ class Reflected:
                 made = forward(one, regions[one.region], region == one.region, looks)
                 means_of = [share @ each for each in made]
                 again.append(fitted_again(one, means_of, pooled, means, regions[one.region]))
-            found = sorted([*again, *found[len(near) :]], key=lambda one: one.score)
+            found = sorted([*again, *(one for one in found if one not in near)], key=rank)
         traced = sum(sight.traced for sight in sights)
         counts = {"rows": len(rows), "regions": len(regions), "rays": traced, "candidates": len(found)}
         counts["carried"] = len(near)
-        return Reflections(self._findings(scene, asked, regions, found), (), counts)
+        nothing = score_of(1.0, 0, 0.0)
+        better = [one for one in found if one.score < nothing]
+        if not better or rank(better[0])[0]:  # there is none, or none that is meant
+            return Reflections(counts=counts)
+        return Reflections(self._findings(scene, asked, regions, better), (), counts)
 
     def _findings(
         self, scene: Scene, strokes: Sequence[Stroke], regions: list[Changeable], found: list[Candidate]
     ) -> tuple[Finding, ...]:
-        nothing = score_of(1.0, 0, 0.0)
-        better = [one for one in found if one.score < nothing]
         by_region: dict[int, list[Candidate]] = {}
-        for one in better:
+        for one in found:
             by_region.setdefault(one.region, []).append(one)
-        close = sum(one.score - better[0].score < CLOSE for one in better[1:]) if better else 0
+        close = sum(one.score - found[0].score < CLOSE for one in found[1:])
         ids = tuple(stroke.id for stroke in strokes)
         made: list[Finding] = []
         for number, own in list(by_region.items())[:SHOWN]:
             region = regions[number]
             reasons = tuple(self._reason(scene, region, one) for one in own)
-            made.append(Finding(region.node, region.slot, ids, reasons, close if not made else 0))
+            near = close if not made else 0
+            made.append(Finding(region.node, region.slot, ids, reasons, near, rivals=True))
         return tuple(made)
 
     def _reason(self, scene: Scene, region: Changeable, one: Candidate) -> Reason:
@@ -148,13 +157,17 @@ def _under(rows: Rows, mesh: Any) -> set[tuple[int, int]]:
     return made
 
 
-def allowed(strokes: Sequence[Stroke]) -> frozenset[str]:
-    """Meanings that all strokes allow."""
-    made = frozenset(MEANINGS)
-    for stroke in strokes:
-        if stroke.meaning != AUTOMATIC and stroke.tool != FIXATE:
-            made &= {stroke.meaning}
-    return made
+def meant_by(strokes: Sequence[Stroke], scene: Scene) -> Callable[[Changeable, str], bool]:
+    """Whether a change of an object's slot is one that strokes allow, on an object that somebody chose."""
+    asking = [stroke for stroke in strokes if stroke.tool != FIXATE]
+    meanings = {stroke.meaning for stroke in asking} - {AUTOMATIC}
+    chosen = {(one.through, one.through_slot) for one in asking if one.through in scene.nodes}
+
+    def meant(region: Changeable, meaning: str) -> bool:
+        there = not chosen or not chosen.isdisjoint({(region.node, region.slot), (region.node, -1)})
+        return there and meanings <= {meaning}
+
+    return meant
 
 
 def solve_reflected(
@@ -164,4 +177,4 @@ def solve_reflected(
     return Reflected(services).solve(scene, strokes, lit, job).findings
 
 
-__all__ = ["Reflected", "Reflections", "allowed", "solve_reflected"]
+__all__ = ["Reflected", "Reflections", "meant_by", "solve_reflected"]

@@ -18,9 +18,9 @@ from studio_core.arrays import frozen_map
 from studio_core.contract import Services
 from studio_core.edits import Compound
 from studio_core.params import param
-from studio_core.scene.nodes import NodeId, Scene
+from studio_core.scene.nodes import MeshObject, NodeId, Scene
 from studio_core.shading.job import Job
-from studio_core.strokes.solution import Lit, Reason, Solution
+from studio_core.strokes.solution import Finding, Lit, Reason, Solution
 from studio_core.strokes.solved import Solved
 from studio_core.strokes.stroke import FIXATE, Stroke
 from studio_plugins.slf.columns import sums_at
@@ -38,6 +38,7 @@ from studio_plugins.slf.explaining import (
 from studio_plugins.slf.incident import Incident
 from studio_plugins.slf.outcome import Canvas, finding_of, label_of, told
 from studio_plugins.slf.places import Places, places_of
+from studio_plugins.slf.recolouring import PutBack
 from studio_plugins.slf.reflected import Reflected
 from studio_plugins.slf.regions import Region, regions_of, steps, touched
 from studio_plugins.slf.samples import F64, Reflectance, Samples
@@ -160,25 +161,28 @@ class JointRun:
         stay = [stroke for stroke in before.of(Stroke) if stroke.tool == FIXATE]
         found = self._reflected.solve(scene, [*new, *stay], lit, job)
 
-        def whole(reason: Reason, node: NodeId, chosen: bool) -> Reason:
-            word = {"meaning": reason.meaning} if chosen else {}
-            remember = Solved(
-                bare.label,
-                strokes=frozen_map({stroke.id: {**word, "reached": (node,)} for stroke in new}),
-            )
-            edits = (near.edit, bare, reason.edit, remember)
+        names = tuple(stroke.id for stroke in new)
+        others = {node: thing for node in {one.node for one in found.findings}
+                  if isinstance(thing := scene[node], MeshObject)}  # fmt: skip
+        put_back = PutBack(names, frozen_map(others))
+
+        def whole(reason: Reason, finding: Finding, chosen: bool) -> Reason:
+            node = finding.node
+            word: dict[str, Any] = {"reached": (node,)}
+            if chosen:
+                word |= {"meaning": reason.meaning, "through": node, "through_slot": finding.slot}
+            remember = Solved(bare.label, strokes=frozen_map(dict.fromkeys(names, word)))
+            edits = (near.edit, bare, put_back, reason.edit, remember)
             return dataclasses.replace(reason, edit=Compound(told(scene, node, reason.meaning), edits))
 
         findings = [
-            dataclasses.replace(
-                finding, reasons=tuple(whole(one, finding.node, True) for one in finding.reasons)
-            )
+            dataclasses.replace(finding, reasons=tuple(whole(one, finding, True) for one in finding.reasons))
             for finding in found.findings
         ]
         edit = near.edit
         if found.findings:
             first = found.findings[0]
-            edit = whole(first.reasons[0], first.node, False).edit
+            edit = whole(first.reasons[0], first, False).edit
         counts = {**near.counts, **found.counts}
         notes = (*near.notes, *found.notes)
         return Solution(edit, (*findings, *near.findings), notes, frozen_map(counts))

@@ -88,6 +88,28 @@ def test_through_the_door_it_is_one_edit_that_is_not_made_twice(services: Servic
     assert "side" in bared(made, off)
 
 
+def test_what_is_taken_instead_takes_the_first_back_and_is_remembered(services: Services) -> None:
+    painting = Painting(separate(furnished((LAMP, CAMERA))), services)
+    some = painting.vertices("floor", (-1.4, 0, 0.3), 150)
+    before = painting.radiance(painting.lit, some)
+    stroke = painting.stroke(some, before * (0.9, 1.15, 0.9), flat=True)
+    there, run = painting.scene.with_nodes(stroke), SOLVER.open(services)
+    solution = run.solve(there, [stroke.id], painting.given(), Params(), JOB)
+    first, second = solution.findings[:2]
+    made = solution.edit(there)
+    assert made[first.node].paint is not None
+    taken = second.reasons[0].edit(made)
+    assert taken[first.node] == there[first.node]
+    assert taken[second.node].paint is not None
+    now = taken[stroke.id]
+    assert (now.through, now.through_slot, now.reached) == (second.node, second.slot, (second.node,))
+    back = first.reasons[0].edit(taken)
+    assert back[second.node] == there[second.node]
+    again = run.solve(taken, [stroke.id], painting.given(), Params(), JOB)
+    assert again.findings[0].node == second.node
+    assert again.edit(taken)[first.node].paint is None
+
+
 def test_figure_17_a_flat_stroke_makes_the_light_as_green(services: Services) -> None:
     painting = Painting(separate(furnished((LAMP, CAMERA))), services)
     some = painting.vertices("floor", (-1.4, 0, 0.3), 150)

@@ -36,11 +36,24 @@ def wanted_from(painting: Painting, some: Any, **values: Any) -> Any:
     return painting.after(recoloured(painting.scene, "side", **values), some)
 
 
-def test_only_what_the_stroke_means_is_changed(painting: Painting) -> None:
+def test_what_the_stroke_means_comes_first_and_all_else_is_offered(painting: Painting) -> None:
     some = painting.vertices("floor", (-1.3, 0, 0), 80)
     wanted = wanted_from(painting, some, base_color=(0.2, 0.6, 0.9))
-    found = painting.solve(painting.stroke(some, wanted, meaning="shine"))
-    assert all(reason.meaning == "shine" for one in found.findings for reason in one.reasons)
+    free = painting.solve(painting.stroke(some, wanted)).findings
+    assert (free[0].node, free[0].reasons[0].meaning) == ("side", "colour")
+    assert all(one.rivals for one in free)
+    assert not painting.solve(painting.stroke(some, wanted, meaning="shine")).findings, "that is none"
+    shiny = {"diffuse": (0.7, 0.6, 0.5), "specular": (0.8, 0.8, 0.8), "roughness": 0.35}
+    brighter = painting.after(recoloured(painting.scene, "side", "specgloss", **shiny), some)
+    assert painting.solve(painting.stroke(some, brighter)).findings[0].reasons[0].meaning == "shine"
+    meant = painting.solve(painting.stroke(some, brighter, meaning="colour")).findings
+    assert meant[0].reasons[0].meaning == "colour"
+    assert any(reason.meaning == "shine" for one in meant for reason in one.reasons)
+    second = meant[1].node
+    other = painting.solve(painting.stroke(some, brighter, through=second)).findings
+    assert [one.node for one in other][:2] == [second, "side"]
+    assert painting.solve(painting.stroke(some, wanted, through="gone")).findings[0].node == "side"
+    assert not painting.solve(painting.stroke(some, wanted, through="floor")).findings, "it lies on that"
 
 
 def test_a_fixate_takes_its_object_out(painting: Painting) -> None:

@@ -109,6 +109,14 @@ def test_objects_without_a_name_of_their_own_go_by_id():
     assert strokes_from_json(strokes_json(both))[0].objects == ("cube", "gone")
 
 
+def test_what_changes_for_a_stroke_is_told_by_its_name():
+    scene = scene_with(some_marks(), indirect=True, through="floor", through_slot=0)
+    (made,) = strokes_from_json(strokes_json(scene))
+    assert made.fields["through"] == "Floor"
+    gone = scene_with(some_marks(), indirect=True, through="gone")
+    assert "through" not in strokes_from_json(strokes_json(gone))[0].fields
+
+
 MARKS = json.loads(strokes_json(scene_with(some_marks())))["strokes"][0]["marks"]
 WRONG = [
     ({"path": PATH, "colr": 1}, "'colr'"),
@@ -141,6 +149,7 @@ WRONG = [
     ({"path": PATH, "camera": {"from": [0, 0, 0], "to": [0, 0, 0]}}, "looks from where"),
     ({"path": PATH, "camera": {"from": [0, 0, 0], "to": [0, 0, 1], "fov": 200}}, "fov"),
     ({"path": PATH, "weight": -1}, "weight"),
+    ({"path": PATH, "through": 3}, "through"),
     ({"path": PATH, "weight": "1"}, "expected a number"),
     ({"path": PATH, "meaning": "magic"}, "meaning"),
     ({"path": PATH, "meaning": 3}, "expected a text"),

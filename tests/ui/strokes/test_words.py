@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import re
 
 import numpy as np
@@ -18,7 +19,7 @@ from studio_core.strokes.solution import Finding, Reason
 from studio_core.strokes.stroke import AUTOMATIC, COLOUR, FIXATE, GLOSS, TOOLS, Stroke
 from studio_ui.canvas.projection import project
 from studio_ui.strokes.sketches import around
-from studio_ui.strokes.why import chosen_reason, swatch, worth_showing
+from studio_ui.strokes.why import chosen_reason, held, swatch, together, worth_showing
 from studio_ui.strokes.words import TOOLS as NAMES
 from studio_ui.strokes.words import changed, nothing_found, painted_on, place, sentence, silence
 
@@ -86,8 +87,24 @@ def test_colours_are_seen_and_read() -> None:
 def test_what_explains_nothing_is_not_offered() -> None:
     reasons = (reason(COLOUR), reason(GLOSS, 0.004), reason("", 0.0), reason("shine", 0.2))
     finding = Finding("stool", 0, ("s",), reasons)
-    assert [r.meaning for r in worth_showing(finding, reasons[0])] == [COLOUR, "", "shine"]
-    assert reasons[1] in worth_showing(finding, reasons[1])
+    assert [r.meaning for _, r in worth_showing([finding], reasons[0])] == [COLOUR, "", "shine"]
+    assert (finding, reasons[1]) in worth_showing([finding], reasons[1])
+
+
+def test_of_rivals_one_holds_and_the_best_are_offered_with_it() -> None:
+    def rival(node: str, *scores: float) -> Finding:
+        reasons = (dataclasses.replace(reason(COLOUR), score=score) for score in scores)
+        return Finding(node, 0, ("s",), tuple(reasons), rivals=True)
+
+    side, _, lamp = rivals = [rival("side", 1.0, 4.0, 5.0), rival("box", 2.0, 6.0), rival("lamp", 7.0)]
+    plain = Finding("stool", 0, ("s",), (reason(COLOUR),))
+    assert together([*rivals, plain]) == [rivals, [plain]]
+    assert held(Stroke(id="s"), rivals) == (side, side.reasons[0])
+    chosen = Stroke(id="s", meaning=COLOUR, through="lamp", through_slot=0)
+    assert held(chosen, rivals) == (lamp, lamp.reasons[0])
+    assert [r.score for _, r in worth_showing(rivals, side.reasons[0])] == [1, 2, 4, 5]
+    assert [r.score for _, r in worth_showing(rivals, lamp.reasons[0])] == [1, 2, 4, 7]
+    assert held(Stroke(id="s", through="gone"), rivals) == (side, side.reasons[0])
 
 
 def test_strokes_without_an_explanation_say_what_that_means() -> None:

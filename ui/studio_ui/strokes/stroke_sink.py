@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 from studio_core.edits import Edit, SetFields
 from studio_core.params import Value, param_infos
 from studio_core.scene.nodes import NodeId
-from studio_core.strokes.stroke import Stroke
+from studio_core.strokes.stroke import AUTOMATIC, Stroke
 from studio_ui.context import Context
 from studio_ui.strokes.bench import Order
 from studio_ui.strokes.brush_store import REACH, BrushStore
@@ -85,7 +86,10 @@ class StrokeSink:
         return Order(edit.label, lambda: edit, stroke.id)
 
     def _edit(self, stroke: Stroke, name: str, value: Value) -> Edit:
-        return SetFields(stroke.id, {name: value}, self._label(stroke, name))
+        values: dict[str, Any] = {name: value}
+        if name == "meaning" and value == AUTOMATIC:
+            values |= {"through": "", "through_slot": -1}  # any object may change for it again
+        return SetFields(stroke.id, values, self._label(stroke, name))
 
     @staticmethod
     def _label(stroke: Stroke, name: str) -> str:

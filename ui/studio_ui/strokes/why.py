@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import html
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 
 import numpy as np
@@ -24,7 +24,16 @@ from studio_ui.look.role import set_role
 from studio_ui.look.theme import GAP
 from studio_ui.panels.panel import clear, note
 from studio_ui.strokes.sketches import HEIGHT, WIDTH, Sketches
-from studio_ui.strokes.words import changed, explained, nothing_found, number, place, sentence, silence
+from studio_ui.strokes.words import (
+    SEPARATOR,
+    changed,
+    explained,
+    nothing_found,
+    number,
+    place,
+    sentence,
+    silence,
+)  # fmt: skip
 
 _CARDS = 4
 """Reasons that are shown as pictures, the chosen one among them."""
@@ -69,26 +78,30 @@ class Why(QWidget):
         self.told.setVisible(not findings and not solution.notes)
         self.told.setText(nothing_found(stroke))
         set_role(self.told, "dim")
-        for finding in findings:
-            chosen = chosen_reason(stroke, finding)
-            where, change = place(scene, finding.node, finding.slot), self._change(scene, finding, chosen)
-            told, shown = (change(how) for how in (number, swatch))
-            line = _line(sentence(html.escape(where), chosen, shown))
-            line.setTextFormat(Qt.TextFormat.RichText)
-            line.setAccessibleName(sentence(where, chosen, told))
-            line.setToolTip(told)
-            self.lines.append(line)
-            self._rest.addWidget(line)
-            if chosen.meaning or finding.close:
-                self._add_cards(scene, stroke, finding)
+        for rivals in together(findings):
+            finding, chosen = held(stroke, rivals)
+            self._add_line(scene, finding, chosen)
+            close = max(one.close for one in rivals)
+            if chosen.meaning or close:
+                self._add_cards(scene, stroke, rivals)
             silent = silence(finding)
             if silent:
                 self._rest.addWidget(note(silent))
-            if finding.close:
-                others = "One other reason is" if finding.close == 1 else f"{finding.close} other reasons are"
+            if close:
+                others = "One other reason is" if close == 1 else f"{close} other reasons are"
                 self._rest.addWidget(note(f"{others} nearly as good"))
         for text in solution.notes:
             self._rest.addWidget(note(text))
+
+    def _add_line(self, scene: Scene, finding: Finding, chosen: Reason) -> None:
+        where, change = place(scene, finding.node, finding.slot), self._change(scene, finding, chosen)
+        told, shown = (change(how) for how in (number, swatch))
+        line = _line(sentence(html.escape(where), chosen, shown))
+        line.setTextFormat(Qt.TextFormat.RichText)
+        line.setAccessibleName(sentence(where, chosen, told))
+        line.setToolTip(told)
+        self.lines.append(line)
+        self._rest.addWidget(line)
 
     def _empty(self) -> None:
         self._sketches.forget()
@@ -104,15 +117,15 @@ class Why(QWidget):
                 widget.hide()
                 widget.deleteLater()
 
-    def _add_cards(self, scene: Scene, stroke: Stroke, finding: Finding) -> None:
-        current = chosen_reason(stroke, finding)
-        shown = worth_showing(finding, current)
+    def _add_cards(self, scene: Scene, stroke: Stroke, rivals: Sequence[Finding]) -> None:
+        current = held(stroke, rivals)[1]
+        shown = worth_showing(rivals, current)
         if len(shown) < 2:
             return
         grid = QGridLayout()
         grid.setSpacing(GAP)
         self._rest.addLayout(grid)
-        for at, reason in enumerate(shown):
+        for at, (finding, reason) in enumerate(shown):
             card = self._card(scene, finding, reason, chosen=reason is current)
             grid.addWidget(card, at // _COLUMNS, at % _COLUMNS)
             self.cards.append(card)
@@ -128,11 +141,14 @@ class Why(QWidget):
         blank = QPixmap(WIDTH, HEIGHT)
         blank.fill(self.palette().color(QPalette.ColorRole.Base))
         card.setIcon(QIcon(blank))
-        name = reason.meaning or "no change"
-        share = 100 * min(max(reason.explained, 0.0), 1.0)
-        card.setText(f"{name}  {share:.0f} %")
+        name, where = reason.meaning or "no change", place(scene, finding.node, finding.slot)
+        short = where.split(SEPARATOR)[-1] if finding.rivals else name
+        share = f"  {100 * min(max(reason.explained, 0.0), 1.0):.0f} %"
+        room = WIDTH - card.fontMetrics().horizontalAdvance(share)
+        card.setText(card.fontMetrics().elidedText(short, Qt.TextElideMode.ElideRight, room) + share)
+        name = f"{name} of {where}" if finding.rivals else name
         change = self._change(scene, finding, reason)(number)
-        tip = f"{change}\n{explained(reason)}" if change else explained(reason)
+        tip = "\n".join(text for text in (where * finding.rivals, change, explained(reason)) if text)
         card.setToolTip(f"{tip}\nThis is it now" if chosen else f"{tip}\nClick to take it instead")
         card.setAccessibleName(f"Explain by {name}")
         card.clicked.connect(lambda: card.setChecked(chosen) if chosen else self.taken(finding, reason))
@@ -183,10 +199,34 @@ def _line(text: str) -> QLabel:
     return made
 
 
-def worth_showing(finding: Finding, current: Reason) -> list[Reason]:
-    """Reasons that explain something, to change nothing, and the one that holds now."""
-    made = [r for r in finding.reasons if not r.meaning or r.explained > _NOTHING or r is current]
-    return made[:_CARDS]
+def together(findings: Sequence[Finding]) -> list[list[Finding]]:
+    """Findings of which each holds, alone; and those of which one alone holds, together."""
+    rivals = [finding for finding in findings if finding.rivals]
+    others = [[finding] for finding in findings if not finding.rivals]
+    return [rivals, *others] if rivals else others
+
+
+def held(stroke: Stroke, rivals: Sequence[Finding]) -> tuple[Finding, Reason]:
+    """What a stroke means now: what was taken, or the best."""
+    wanted = ((stroke.through, stroke.through_slot), (stroke.through, -1))
+    finding = next((one for one in rivals if (one.node, one.slot) in wanted), rivals[0])
+    return finding, chosen_reason(stroke, finding)
+
+
+def worth_showing(rivals: Sequence[Finding], current: Reason) -> list[tuple[Finding, Reason]]:
+    """Reasons that explain something, to change nothing, and the one that holds now; a few, best first."""
+    made = [
+        (finding, reason)
+        for finding in rivals
+        for reason in finding.reasons
+        if not reason.meaning or reason.explained > _NOTHING or reason is current
+    ]
+    if len(rivals) > 1:
+        made.sort(key=lambda one: one[1].score)
+    shown = made[:_CARDS]
+    return shown if any(reason is current for _, reason in shown) else [
+        *shown[:-1], *(one for one in made if one[1] is current)
+    ]  # fmt: skip
 
 
 def chosen_reason(stroke: Stroke, finding: Finding) -> Reason:

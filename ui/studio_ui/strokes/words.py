@@ -29,6 +29,7 @@ TOOLS: Mapping[str, tuple[str, str, str, str]] = {
     FIXATE: ("Keep", "Kept place", "Keep", "What is here stays, whatever other strokes ask for"),
 }
 """By tool: on its button, in names of strokes, in the history, and what it does."""
+SEPARATOR = " · "
 _NOTHING = "nothing needs to change"
 _MOST = 3  # parameters that are told
 
@@ -56,7 +57,7 @@ def place(scene: Scene, node: NodeId, slot: int = 0) -> str:
     parts.append(thing.name)
     if isinstance(thing, MeshObject) and len(thing.materials) > 1 and slot < len(thing.materials):
         parts.append(scene.material(thing.materials[slot]).name)
-    return " · ".join(parts)
+    return SEPARATOR.join(parts)
 
 
 def explained(reason: Reason) -> str:
@@ -126,5 +127,6 @@ def _apart(one: object, other: object) -> float:
 
 
 __all__ = [
-    "TOOLS", "changed", "explained", "nothing_found", "number", "painted_on", "place", "sentence", "silence",
+    "SEPARATOR", "TOOLS", "changed", "explained", "nothing_found", "number", "painted_on", "place",
+    "sentence", "silence",
 ]  # fmt: skip
