@@ -17,10 +17,11 @@ from PySide6.QtWidgets import QLabel, QToolButton
 from pytestqt.qtbot import QtBot
 from ui_support import Driver
 
+from studio_core.edits import SetFields
 from studio_core.errors import InputError
 from studio_core.scene.nodes import MeshObject
 from studio_core.scene.paint import Paint
-from studio_core.strokes.stroke import GLOSS, Stroke
+from studio_core.strokes.stroke import AUTOMATIC, GLOSS, Stroke
 from studio_plugins.slf import plugin as slf
 from studio_ui.canvas.viewport import Pointer
 from studio_ui.strokes.sketches import HEIGHT, WIDTH
@@ -198,6 +199,20 @@ def test_the_runner_up_is_a_click_away(painter: Driver) -> None:
     driver.do("edit.undo")
     assert stool(driver).paint is first
     assert [card.isChecked() for card in controls(driver).why.cards] == [True, False]
+
+
+def test_what_is_left_to_the_program_again_may_change_any_object(painter: Driver) -> None:
+    driver = painter
+    paint(driver, driver.at(STOOL), QPoint(10, 0))
+    (stroke,) = strokes(driver)
+    chosen = {"meaning": GLOSS, "through": "stool", "through_slot": 0}
+    driver.context.editing.apply(SetFields(stroke.id, chosen, "Choose"))
+    means = controls(driver).form.fields["meaning"].combo  # type: ignore[attr-defined]
+    driver.until(lambda: means.currentText() == GLOSS)
+    means.activated.emit(means.findText(AUTOMATIC))
+    driver.until(lambda: not desk(driver).work.begun)
+    (stroke,) = strokes(driver)
+    assert (stroke.meaning, stroke.through, stroke.through_slot) == (AUTOMATIC, "", -1)
 
 
 def test_escape_abandons_a_stroke(painter: Driver) -> None:
