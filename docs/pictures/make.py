@@ -6,7 +6,8 @@ does and lets it rest, exact and refined. `capture` has the simulated phone phot
 capture panel make its light of that. `library` shows the library of materials in both themes. `fit` has a
 ball of the lab photographed and shows the report of the material that is made of it. `bases` and `products`
 draw figures 8 and 10 of the interreflection paper. `between` renders the room with the red cabinet with and
-without light between surfaces. `strokes` paints on the sofa and shows why that is explained as it is.
+without light between surfaces. `strokes` paints on the sofa and shows why that is explained as it is,
+`tint` paints light of the red cabinet off the wall.
 `figures NUMBER …` plays figures of the paper on strokes, `painted` paints on the sample room.
 """
 
@@ -390,9 +391,16 @@ def fit() -> None:
 
 def strokes() -> None:
     """The stroke panel after a stroke on the sofa in the colour of the armchair."""
-    from painted_sofa import photograph
+    from painted_in_the_window import SOFA, photograph
 
-    photograph(HERE / "strokes.webp", WINDOW, 5 * SETTLED)
+    photograph(SOFA, HERE / "strokes.webp", WINDOW, 5 * SETTLED)
+
+
+def tint() -> None:
+    """The stroke panel after the red cabinet's light on the wall was painted away."""
+    from painted_in_the_window import TINT, photograph
+
+    photograph(TINT, HERE / "strokes-tint.webp", WINDOW, 5 * SETTLED)
 
 
 def bases() -> None:
@@ -448,6 +456,6 @@ def painted() -> None:
 if __name__ == "__main__":
     makers = {"room": room, "windows": windows, "window": window, "chair": chair, "capture": capture}
     makers |= {"library": library, "captured": captured, "fit": fit, "between": between}
-    makers |= {"bases": bases, "products": products, "strokes": strokes}
+    makers |= {"bases": bases, "products": products, "strokes": strokes, "tint": tint}
     makers |= {"figures": figures, "painted": painted}
     makers[sys.argv[1]](*sys.argv[2:])

@@ -35,8 +35,9 @@ STRANGE = 0.15
 """Relative error of a place's light as it is, from which on it says little of how it would change."""
 NOISE_OF_ONE_LIGHT = 0.05
 """As `joint.NOISE`, of one flat colour."""
-ENOUGH = 0.75
-"""What explains so much of a flat colour may be it, without another tint of the shine."""
+ENOUGH = 2 / 3
+"""What explains so much of a flat colour may be it, without another tint of the shine. On a blue sofa, orange
+is its colour with 72 %; a yellow glint on tiles is 60 % their colour, 91 % their shine."""
 
 
 @dataclass(frozen=True, eq=False)

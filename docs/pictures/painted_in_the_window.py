@@ -1,4 +1,4 @@
-"""Photographs the stroke panel after a stroke on the sofa in the colour of the armchair; see `make.py`."""
+"""Photographs the stroke panel after a stroke in a colour of the picture; see `make.py`."""
 
 from __future__ import annotations
 
@@ -7,12 +7,26 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 
-ARMCHAIR, SEAT = (0.9, 0.51), ((0.47, 0.51), (0.49, 0.52), (0.51, 0.52))  # of the picture
+
+@dataclass(frozen=True)
+class Painting:
+    """Of a sample room: where the colour is taken and the path, in parts of the picture; the brush."""
+
+    sample: str
+    colour: tuple[float, float]
+    path: tuple[tuple[float, float], ...]
+    size: float
+    indirect: bool = False
 
 
-def photograph(target: Path, size: tuple[int, int], patience: float) -> None:
+SOFA = Painting("living-room", (0.9, 0.51), ((0.47, 0.51), (0.49, 0.52), (0.51, 0.52)), 0.06)
+TINT = Painting("red-cabinet", (0.09, 0.48), ((0.39, 0.44), (0.41, 0.5), (0.43, 0.57)), 0.26, True)
+
+
+def photograph(painting: Painting, target: Path, size: tuple[int, int], patience: float) -> None:
     """A window of so many pixels, to a file; `patience` in seconds."""
     os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
     os.environ["LUCARNE_STATE"] = tempfile.mkdtemp(prefix="lucarne-pictures-")
@@ -29,7 +43,7 @@ def photograph(target: Path, size: tuple[int, int], patience: float) -> None:
     studio = assemble(settings=Settings(state_folder()))
     studio.window.resize(*size)
     studio.window.show()
-    studio.window.files.open_copy(sample())
+    studio.window.files.open_copy(sample(painting.sample))
     feed = studio.context.feed
 
     def wait(for_what: Callable[[], bool]) -> None:
@@ -55,11 +69,12 @@ def photograph(target: Path, size: tuple[int, int], patience: float) -> None:
     def at(place: tuple[float, float]) -> QPoint:
         return QPoint(round(place[0] * canvas.width()), round(place[1] * canvas.height()))
 
-    QTest.mouseClick(canvas, button, Qt.KeyboardModifier.AltModifier, at(ARMCHAIR))
-    QTest.mousePress(canvas, button, none, at(SEAT[0]))
-    for place in SEAT[1:]:
+    desk.store.use(size=painting.size, indirect=painting.indirect)
+    QTest.mouseClick(canvas, button, Qt.KeyboardModifier.AltModifier, at(painting.colour))
+    QTest.mousePress(canvas, button, none, at(painting.path[0]))
+    for place in painting.path[1:]:
         QTest.mouseMove(canvas, at(place))
-    QTest.mouseRelease(canvas, button, none, at(SEAT[-1]))
+    QTest.mouseRelease(canvas, button, none, at(painting.path[-1]))
     wait(
         lambda: (
             not desk.work.begun and rests() and panel.controls is not None and bool(panel.controls.why.cards)
@@ -73,4 +88,4 @@ def photograph(target: Path, size: tuple[int, int], patience: float) -> None:
     studio.close()
 
 
-__all__ = ["photograph"]
+__all__ = ["SOFA", "TINT", "Painting", "photograph"]
