@@ -15,7 +15,8 @@ from studio_core.strokes.marks import Marks
 from studio_core.strokes.paintable import paintable
 from studio_core.strokes.stroke import AUTOMATIC, FIXATE, Stroke
 from studio_plugins.slf.dressed import Dressed
-from studio_plugins.slf.joint import NOISE, SINGLE, Change, Verdict, decide
+from studio_plugins.slf.grams import Grams, Shines, best
+from studio_plugins.slf.joint import NOISE, SINGLE, Change, Explanation, Verdict, decide
 from studio_plugins.slf.places import Places
 from studio_plugins.slf.regions import Region
 from studio_plugins.slf.samples import F64, Reflectance, Samples
@@ -38,6 +39,8 @@ NOISE_OF_ONE_LIGHT = 0.05
 ENOUGH = 2 / 3
 """What explains so much of a flat colour may be it, without another tint of the shine. On a blue sofa, orange
 is its colour with 72 %; a yellow glint on tiles is 60 % their colour, 91 % their shine."""
+NEAR, STEPS = 1.5, 12
+"""Levels around that of a gloss, among which one flat colour alone may choose; steps to each side."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,15 +119,17 @@ def _painted(marks: Marks) -> npt.NDArray[np.bool_]:
     return np.asarray(np.not_equal(marks.wanted, marks.shown).any(axis=1), np.bool_)
 
 
-def pooled_of(parts: Sequence[tuple[Stroke, Samples, Places]]) -> Samples:
-    """All samples; of a stroke in one flat colour its mean, and what lies beside it as it is."""
+def pooled_of(parts: Sequence[tuple[Stroke, Samples, Places]], beside: bool = True) -> Samples:
+    """All samples; of a stroke in one flat colour its mean, and what lies beside it as it is, or without."""
     made: Samples | None = None
     for stroke, samples, places in parts:
         one = samples
         if stroke.flat and stroke.tool != FIXATE and stroke.marks is not None:
             marks = stroke.marks.some(places.mark)
             painted = _painted(marks)
-            one = samples.some(np.flatnonzero(painted)).mean() + samples.some(np.flatnonzero(~painted))
+            one = samples.some(np.flatnonzero(painted)).mean()
+            if beside:
+                one = one + samples.some(np.flatnonzero(~painted))
         made = one if made is None else made + one
     assert made is not None
     return made
@@ -178,6 +183,37 @@ def explained(
     return decide(samples, dressed, now, allowed, tints_of(samples, dressed, now), exactness)
 
 
+def as_painted(verdict: Verdict, painted: Samples, dressed: Dressed, now: Reflectance) -> Verdict:
+    """With as much of the one number or colour that changes as makes what was `painted`, without its beside.
+
+    What lies beside one flat colour tells which parameter it is; that it stays is not meant as exactly.
+    """
+    painted = painted.some(np.flatnonzero(painted.finite & (painted.weight > 0)))
+    if not len(painted):
+        return verdict
+    here = Grams.of(painted, np.array([now.level]), painted.importance, painted.own[None])
+    staying = Shines.start(dressed, now, None)
+
+    def sized(one: Explanation) -> Explanation:
+        found = one.reflectance
+        if one.change is Change.DIFFUSE:
+            made = best(here, dressed, now, True, staying)
+        elif one.change is Change.SPECULAR:
+            tint = found.tint if found.specular.max() > 0 else now.tint
+            made = best(here, dressed, now, False, Shines.start(dressed, now, tint))
+        elif one.change is Change.GLOSS:
+            levels = found.level + np.linspace(-NEAR, NEAR, 2 * STEPS + 1)
+            levels = levels[(levels >= 0) & (levels <= painted.levels - 1)]
+            levels = levels[np.sign(levels - now.level) == np.sign(found.level - now.level)]
+            grams = Grams.of(painted, levels, painted.importance)
+            made = best(grams, dressed, now, False, staying)
+        else:
+            return one
+        return dataclasses.replace(one, reflectance=made.reflectance)
+
+    return dataclasses.replace(verdict, explanations=tuple(map(sized, verdict.explanations)))
+
+
 def tints_of(samples: Samples, dressed: Dressed, now: Reflectance) -> tuple[F64, ...]:
     """White, and the colour in which the shine would have what was painted."""
     if dressed.white:
@@ -197,9 +233,11 @@ __all__ = [
     "WORDS",
     "Painting",
     "Step",
+    "as_painted",
     "explained",
     "meant_first",
     "on_region",
+    "one_light",
     "pooled_of",
     "samples_of",
 ]

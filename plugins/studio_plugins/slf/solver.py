@@ -29,9 +29,11 @@ from studio_plugins.slf.dressed import Dressed
 from studio_plugins.slf.explaining import (
     Painting,
     Step,
+    as_painted,
     explained,
     meant_first,
     on_region,
+    one_light,
     pooled_of,
     samples_of,
 )
@@ -213,6 +215,8 @@ class JointRun:
             return
         dressed, parts = painting.dressed, said.parts
         verdict = explained(pooled_of(parts), dressed, said.now, said.strokes, params.coloured)
+        if one_light(said.strokes):
+            verdict = as_painted(verdict, pooled_of(parts, beside=False), dressed, said.now)
         verdict = meant_first(verdict, dressed, group)
         painting.take(Step(said.strokes, verdict, said.now, said.gloss, said.count))
 
