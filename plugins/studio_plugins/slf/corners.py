@@ -8,6 +8,8 @@ hidden.
 
 from __future__ import annotations
 
+import dataclasses
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,6 +27,8 @@ F64 = npt.NDArray[np.float64]
 I64 = npt.NDArray[np.int64]
 ABOVE = 1e-3
 """Metres above a mark from which its face is looked for."""
+BENT = math.cos(math.radians(6))
+"""Cosine between normals of a face's corners, below which a picture at rest has more vertices there."""
 FEW = 200
 """So many corners are always summed, and else as many as there are places."""
 
@@ -32,12 +36,15 @@ FEW = 200
 @dataclass(frozen=True, eq=False)
 class Corners:
     """Of N marks: C vertices as places, each seen from an eye; which of these (N, K) a mark lies between, and
-    how near to each, weight (N, K) with sums of 1; K is 3 or 1.
+    how near to each, weight (N, K) with sums of 1; K is 3 or 1. bent (B,) are marks whose faces stand for
+    much of a curve, `own` their places with the light of the nearest corners.
     """
 
     places: Places
     which: I64
     weight: F64
+    bent: I64
+    own: Places
 
     @classmethod
     def of(cls, lit: Lit, places: Places, eye: F64, workers: Workers, few: int = FEW) -> Corners:
@@ -59,14 +66,19 @@ class Corners:
         alone = ~met | ~(total > 0)
         corner[alone], weight[alone], total[alone] = places.vertex[alone, None], (1, 0, 0), 1
         weight /= total[:, None]
+        heaviest = np.take_along_axis(corner, weight.argmax(axis=1)[:, None], axis=1)
+        normals = mesh.normals[corner]
+        bent = np.flatnonzero(
+            np.einsum("nkc,nkc->nk", normals, np.roll(normals, 1, axis=1)).min(axis=1) < BENT
+        )
+        own = dataclasses.replace(places.some(bent), vertex=heaviest[bent, 0])
         eyes, seen_from = np.unique(eye, axis=0, return_inverse=True)
         names, which = np.unique(corner * len(eyes) + seen_from.reshape(-1, 1), return_inverse=True)
         if len(names) > max(len(places), few):
-            most = weight.argmax(axis=1)[:, None]
-            corner, weight = np.take_along_axis(corner, most, axis=1), np.ones((len(places), 1))
+            corner, weight = heaviest, np.ones((len(places), 1))
             names, which = np.unique(corner * len(eyes) + seen_from.reshape(-1, 1), return_inverse=True)
         seen = _seen(mesh, names // len(eyes), eyes[names % len(eyes)])
-        return cls(seen, which.reshape(corner.shape), weight)
+        return cls(seen, which.reshape(corner.shape), weight, bent, own)
 
     def between(self, sums: F64) -> F64:
         """(L, N, T, 3) at the marks, of sums (L, C, T, 3) at the corners."""

@@ -183,15 +183,20 @@ def explained(
     return decide(samples, dressed, now, allowed, tints_of(samples, dressed, now), exactness)
 
 
-def as_painted(verdict: Verdict, painted: Samples, dressed: Dressed, now: Reflectance) -> Verdict:
+def as_painted(
+    verdict: Verdict, painted: Samples, curved: Samples, dressed: Dressed, now: Reflectance
+) -> Verdict:
     """With as much of the one number or colour that changes as makes what was `painted`, without its beside.
 
     What lies beside one flat colour tells which parameter it is; that it stays is not meant as exactly.
+    A picture at rest has highlights as surfaces are `curved`, once there are any.
     """
-    painted = painted.some(np.flatnonzero(painted.finite & (painted.weight > 0)))
-    if not len(painted):
+    painted, curved = (
+        some.some(np.flatnonzero(some.finite & (some.weight > 0))) for some in (painted, curved)
+    )
+    if not len(painted) or not len(curved):
         return verdict
-    here = Grams.of(painted, np.array([now.level]), painted.importance, painted.own[None])
+    here = Grams.of(curved, np.array([now.level]), curved.importance, curved.own[None])
     staying = Shines.start(dressed, now, None)
 
     def sized(one: Explanation) -> Explanation:

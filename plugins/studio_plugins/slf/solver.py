@@ -69,9 +69,13 @@ class Joint:
 
 @dataclass(frozen=True, eq=False)
 class Said:
-    """By stroke its samples and where they are; the material's mean there now, and its gloss."""
+    """By stroke its samples and where they are; the material's mean there now, and its gloss.
+
+    `curved` are the same, but before and at the gloss that there is as surfaces curve between vertices.
+    """
 
     parts: tuple[tuple[Stroke, Samples, Places], ...]
+    curved: tuple[tuple[Stroke, Samples, Places], ...]
     now: Reflectance
     gloss: float | None
 
@@ -216,7 +220,8 @@ class JointRun:
         dressed, parts = painting.dressed, said.parts
         verdict = explained(pooled_of(parts), dressed, said.now, said.strokes, params.coloured)
         if one_light(said.strokes):
-            verdict = as_painted(verdict, pooled_of(parts, beside=False), dressed, said.now)
+            painted, curved = (pooled_of(some, beside=False) for some in (parts, said.curved))
+            verdict = as_painted(verdict, painted, curved, dressed, said.now)
         verdict = meant_first(verdict, dressed, group)
         painting.take(Step(said.strokes, verdict, said.now, said.gloss, said.count))
 
@@ -231,6 +236,7 @@ class JointRun:
     ) -> Said | None:
         """What strokes say of a region's material; None where they do not lie on it."""
         parts: list[tuple[Stroke, Samples, Places]] = []
+        curved: list[tuple[Stroke, Samples, Places]] = []
         dressed, mesh = painting.dressed, lit.surfaces.unrefined.mesh
         seen = []
         for stroke in group:
@@ -245,24 +251,37 @@ class JointRun:
         shapes, own_shape = dressed.shapes(), dressed.own_shape(gloss)
         every = np.concatenate([shapes, own_shape[None]])
         for stroke, places in seen:
-            sums, rays = self._sums(dressed, every, stroke, places, scene, lit, job)
+            sums, smooth, rays = self._sums(dressed, every, stroke, places, scene, lit, job)
             painting.rays += rays
             samples, offset = samples_of(stroke, places, sums, dressed, now)
+            curving = samples if smooth is sums else samples_of(stroke, places, smooth, dressed, now)[0]
+            curved.append((stroke, curving, places))
             painting.offsets.setdefault(stroke.id, []).append((places.mark, offset))
             parts.append((stroke, samples, places))
-        return Said(tuple(parts), now, gloss)
+        return Said(tuple(parts), tuple(curved), now, gloss)
 
     def _sums(
         self, dressed: Dressed, shapes: Any, stroke: Stroke, places: Places, scene: Scene, lit: Lit, job: Job
-    ) -> tuple[F64, int]:
-        """(L, N, T, 3) columns at a stroke's places, and the rays that this took."""
+    ) -> tuple[F64, F64, int]:
+        """(L, N, T, 3) columns at a stroke's places; of a flat one also with the last level as surfaces curve
+        between vertices; and the rays that this took.
+        """
         assert stroke.marks is not None
         brdf, workers = dressed.resolved.brdf, self._services.workers
         eye = stroke.marks.eye[places.mark] - lit.surfaces.unrefined.mesh.origin
         corners = Corners.of(lit, places, eye, workers)
         light = self._incident.at(scene, lit, corners.places, job)
         sums = sums_at(brdf.address, brdf.terms, shapes, light, corners.places, workers, job)
-        return corners.between(sums), light.rays
+        made = smooth = corners.between(sums)
+        rays = light.rays
+        if stroke.flat and len(corners.bent):
+            light = self._incident.at(scene, lit, corners.own, job)
+            smooth = made.copy()
+            smooth[-1, corners.bent] = sums_at(
+                brdf.address, brdf.terms, shapes[-1:], light, corners.own, workers, job
+            )[0]
+            rays += light.rays
+        return made, smooth, rays
 
 
 SOLVER = Joint()

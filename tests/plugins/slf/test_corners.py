@@ -74,6 +74,18 @@ def test_a_place_lies_between_the_corners_of_its_face(workers):
         np.testing.assert_allclose(made.between(sums)[:, n], plain)
 
 
+def test_marks_of_faces_that_curve_have_places_of_their_own_too(workers):
+    given, there = places(np.random.default_rng(0), 40), lit()
+    assert not len(Corners.of(there, given, np.tile(EYE, (40, 1)), workers).bent)
+    there.surfaces.unrefined.mesh.normals[1] = (np.sin(0.2), np.cos(0.2), 0)  # of the first face alone
+    made = Corners.of(there, given, np.tile(EYE, (40, 1)), workers)
+    x, _, z = given.position.T
+    np.testing.assert_array_equal(made.bent, np.flatnonzero(z < x))
+    np.testing.assert_array_equal(made.own.position, given.position[made.bent])
+    shares = np.stack([2 - x, x - z, z, 0 * x], axis=1)[made.bent]
+    np.testing.assert_array_equal(made.own.vertex, shares.argmax(axis=1))
+
+
 def test_eyes_have_corners_of_their_own(workers):
     given = places(np.random.default_rng(0), 40)
     eyes = np.where(np.arange(40)[:, None] < 20, EYE, EYE + np.array([0.0, 1.0, 0.0]))
