@@ -48,7 +48,7 @@ LIBRARY = (430, 760)
 PAINTED = (
     {"colour": [0.2, 0.045, 0.035], "shading": True, "path": [[0.63, 0.42], [0.642, 0.436]],
      "brush": {"size": 0.09}, "reach": {"alike": 20}},
-    {"colour": [0.55, 0.52, 0.5], "path": [[0.55, 0.595], [0.56, 0.6]], "brush": {"size": 0.03}},
+    {"colour": [0.26, 0.2, 0.16], "path": [[0.55, 0.595], [0.56, 0.6]], "brush": {"size": 0.03}},
 )  # fmt: skip
 STEPS_SHOWN = ("reflections", "join")
 
