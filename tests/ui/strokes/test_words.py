@@ -19,7 +19,7 @@ from studio_core.strokes.solution import Finding, Reason
 from studio_core.strokes.stroke import AUTOMATIC, COLOUR, FIXATE, GLOSS, TOOLS, Stroke
 from studio_ui.canvas.projection import project
 from studio_ui.strokes.sketches import around
-from studio_ui.strokes.why import chosen_reason, held, swatch, together, worth_showing
+from studio_ui.strokes.why import chosen_reason, held, short_name, swatch, together, worth_showing
 from studio_ui.strokes.words import TOOLS as NAMES
 from studio_ui.strokes.words import changed, nothing_found, painted_on, place, sentence, silence
 
@@ -105,6 +105,15 @@ def test_of_rivals_one_holds_and_the_best_are_offered_with_it() -> None:
     assert [r.score for _, r in worth_showing(rivals, side.reasons[0])] == [1, 2, 4, 5]
     assert [r.score for _, r in worth_showing(rivals, lamp.reasons[0])] == [1, 2, 4, 7]
     assert held(Stroke(id="s", through="gone"), rivals) == (side, side.reasons[0])
+
+
+def test_cards_name_what_tells_them_apart() -> None:
+    one = Finding("stool", 0, ("s",), (reason(COLOUR), reason(GLOSS)), rivals=True)
+    other = Finding("seat", 0, ("s",), (reason(COLOUR),), rivals=True)
+    scene = room()
+    assert [short_name(scene, [one], one, r) for r in one.reasons] == ["colour", "gloss"]
+    told = [short_name(scene, [one, other], f, r) for f in (one, other) for r in f.reasons]
+    assert told == ["Stool", "Stool, gloss", place(scene, "seat").split(" · ")[-1]]
 
 
 def test_strokes_without_an_explanation_say_what_that_means() -> None:

@@ -33,7 +33,7 @@ from studio_ui.strokes.words import (
     place,
     sentence,
     silence,
-)  # fmt: skip
+)
 
 _CARDS = 4
 """Reasons that are shown as pictures, the chosen one among them."""
@@ -126,12 +126,15 @@ class Why(QWidget):
         grid.setSpacing(GAP)
         self._rest.addLayout(grid)
         for at, (finding, reason) in enumerate(shown):
-            card = self._card(scene, finding, reason, chosen=reason is current)
+            name = short_name(scene, rivals, finding, reason)
+            card = self._card(scene, finding, reason, name, chosen=reason is current)
             grid.addWidget(card, at // _COLUMNS, at % _COLUMNS)
             self.cards.append(card)
             self._sketches.want(scene, stroke.id, reason, partial(self._drawn, card))
 
-    def _card(self, scene: Scene, finding: Finding, reason: Reason, *, chosen: bool) -> QToolButton:
+    def _card(
+        self, scene: Scene, finding: Finding, reason: Reason, short: str, *, chosen: bool
+    ) -> QToolButton:
         card = QToolButton()
         card.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextUnderIcon)
         card.setIconSize(QSize(WIDTH, HEIGHT))
@@ -142,7 +145,6 @@ class Why(QWidget):
         blank.fill(self.palette().color(QPalette.ColorRole.Base))
         card.setIcon(QIcon(blank))
         name, where = reason.meaning or "no change", place(scene, finding.node, finding.slot)
-        short = where.split(SEPARATOR)[-1] if finding.rivals else name
         share = f"  {100 * min(max(reason.explained, 0.0), 1.0):.0f} %"
         room = WIDTH - card.fontMetrics().horizontalAdvance(share)
         card.setText(card.fontMetrics().elidedText(short, Qt.TextElideMode.ElideRight, room) + share)
@@ -211,6 +213,15 @@ def held(stroke: Stroke, rivals: Sequence[Finding]) -> tuple[Finding, Reason]:
     wanted = ((stroke.through, stroke.through_slot), (stroke.through, -1))
     finding = next((one for one in rivals if (one.node, one.slot) in wanted), rivals[0])
     return finding, chosen_reason(stroke, finding)
+
+
+def short_name(scene: Scene, rivals: Sequence[Finding], finding: Finding, reason: Reason) -> str:
+    """Of a card: what changes, of several objects which one does, and of one twice both."""
+    what = reason.meaning or "no change"
+    if len(rivals) == 1:
+        return what
+    where = place(scene, finding.node, finding.slot).split(SEPARATOR)[-1]
+    return where if reason is finding.reasons[0] else f"{where}, {what}"
 
 
 def worth_showing(rivals: Sequence[Finding], current: Reason) -> list[tuple[Finding, Reason]]:
