@@ -10,9 +10,13 @@ import pytest
 from scenes import little_scene
 
 from studio.cli import BAD_INPUT, main
+from studio.verbs_strokes import _lines, report
 from studio_core.document import Document
+from studio_core.edits import Compound
 from studio_core.project.lock import acquire
 from studio_core.project.store import load, save
+from studio_core.strokes.session import Painted
+from studio_core.strokes.solution import Finding, Reason
 from studio_core.strokes.stroke import Stroke
 
 QUICK = ["--quiet", "--indirect", "none", "--param", "directions=1024", "--param", "vertices=600"]
@@ -49,6 +53,18 @@ def test_it_paints_and_says_why(room: Path, capsys: pytest.CaptureFixture[str]) 
     assert red > 2 * max(green, blue)
     assert np.isfinite(reason["score"])
     assert load(room / "room.lucarne").scene["cube"].paint is None
+
+
+def test_what_could_change_instead_is_told_as_that() -> None:
+    def found(node: str, stroke: str, rivals: bool = True) -> Finding:
+        reason = Reason("colour", 0.8, 0.0, {}, Compound("", ()))
+        return Finding(node, 0, (stroke,), (reason,), rivals=rivals)
+
+    findings = (found("cube", "s"), found("floor", "s"), found("cube", "t"), found("floor", "u", False))
+    told = report(Painted(little_scene(), (), (), findings, ()), little_scene())
+    assert [one["instead"] for one in told["findings"]] == [False, True, False, False]
+    lines = [line.split(",")[0] for line in _lines(told)]
+    assert lines == ["Cube", "or Floor", "Cube", "Floor"]
 
 
 def test_it_is_a_step_that_can_be_undone(room: Path) -> None:
