@@ -58,12 +58,14 @@ def ticking(
     def send() -> None:
         wait = first
         while not over.wait(wait):
+            wait = EVERY
+            if asked.is_set():  # the last one is still on its way; a second would look like Ctrl-C
+                continue
             asked.set()
             if hasattr(signal, "pthread_kill"):
                 signal.pthread_kill(main, signal.SIGINT)  # wakes what sleeps, too
             else:
                 _thread.interrupt_main()
-            wait = EVERY
 
     def handle(number: int, frame: FrameType | None) -> None:
         nonlocal stopping

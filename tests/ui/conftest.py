@@ -10,6 +10,9 @@ from typing import Any
 os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
 
 import pytest
+from PySide6.QtCore import Qt
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QApplication, QWidget
 from pytestqt.qtbot import QtBot
 from ui_support import Answers, Driver, Fake, Make, room
 
@@ -20,6 +23,15 @@ from studio_core.shading.scheduler import InlineExecutor
 from studio_plugins.brdfs import plugin as brdfs
 from studio_plugins.meshes import plugin as meshes
 from studio_ui.settings import Settings
+
+
+@pytest.fixture(autouse=True)
+def hands_off() -> Iterator[None]:
+    """No button and no key stays held for the next test: Qt remembers those of the last event."""
+    yield
+    if QApplication.instance() is not None:
+        for button in (Qt.MouseButton.LeftButton, Qt.MouseButton.MiddleButton, Qt.MouseButton.RightButton):
+            QTest.mouseRelease(QWidget(), button)
 
 
 @pytest.fixture

@@ -146,6 +146,21 @@ def test_what_never_ends_can_be_stopped(prompt: Prompt, source: str) -> None:
     assert prompt.document.scene is before
 
 
+@pytest.mark.skipif(not hasattr(signal, "pthread_kill"), reason="signals come another way")
+def test_a_tick_that_comes_late_is_no_stop(prompt: Prompt, monkeypatch: pytest.MonkeyPatch) -> None:
+    send = signal.pthread_kill
+
+    def late(thread: int, number: int) -> None:
+        time.sleep(0.01)  # the one before is served meanwhile
+        send(thread, number)
+
+    monkeypatch.setattr(signal, "pthread_kill", late)
+    monkeypatch.setattr("studio_core.scripting.ticking.EVERY", 0.002)
+    prompt.stop_at = 50
+    assert prompt.run("a = np.ones((500, 500))\nwhile True: a @ a").stopped
+    assert prompt.ticks >= 50
+
+
 def test_nobody_is_stopped_while_the_document_tells_of_a_change(prompt: Prompt) -> None:
     heard: list[str] = []
     prompt.document.changed.connect(lambda *_: (time.sleep(0.002), heard.append("first")))
