@@ -16,8 +16,8 @@ from dataclasses import dataclass
 from studio_core.edits import Edit
 from studio_core.errors import EditError
 from studio_core.scene.diff import Changes, diff
-from studio_core.scene.geometry import Geometry, Image
 from studio_core.scene.nodes import Scene
+from studio_core.scene.paint import Paint
 from studio_core.signal import Signal
 
 _VALUE_BYTES = 600  # a node or material
@@ -268,10 +268,10 @@ def _cost(before: Scene, after: Scene) -> int:
 def _parts(scene: Scene) -> dict[int, int]:
     found = {id(thing): _VALUE_BYTES for thing in (*scene.nodes.values(), *scene.materials.values())}
     for node in scene.nodes.values():
-        for name in ("geometry", "image"):
-            heavy: Geometry | Image | None = getattr(node, name, None)
-            if heavy is not None:
-                found[id(heavy)] = heavy.nbytes
+        heavy = [getattr(node, name, None) for name in ("geometry", "image", "table")]
+        paint: Paint | None = getattr(node, "paint", None)
+        heavy += paint.tables if paint is not None else ()
+        found |= {id(thing): thing.nbytes for thing in heavy if thing is not None}
     for material in scene.materials.values():
         found |= {id(t.image): t.image.nbytes for t in material.textures.values()}
         found |= {id(table): table.nbytes for table in material.tables.values()}

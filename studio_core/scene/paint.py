@@ -115,6 +115,11 @@ class Paint:
         return "-".join((self.points.key, *looks, *parts))
 
     @property
+    def tables(self) -> tuple[Table, ...]:
+        """All that it holds."""
+        return (self.points, *self.changes.values(), *(() if self.looks is None else (self.looks,)))
+
+    @property
     def cloud(self) -> Cloud:
         """The points, between which is interpolated."""
         from studio_core.scene.between import Cloud  # heavy: whoever reads a scene shall not wait for it

@@ -34,7 +34,10 @@ from studio_core.project.store import load, save
 from studio_core.scene.diff import Aspect, Changes, diff
 from studio_core.scene.geometry import Geometry
 from studio_core.scene.nodes import Group, Scene
+from studio_core.scene.paint import Paint
 from studio_core.scene.transform import Transform
+from studio_core.strokes.marks import COLUMNS, WIDTH, Marks
+from studio_core.strokes.stroke import Stroke
 
 SEEDS = st.integers(0, 2**32)
 UNLIMITED = 1 << 60
@@ -463,6 +466,19 @@ def test_a_shared_mesh_costs_once() -> None:
     bare = document.history_bytes()
     document.apply(copies.duplicate(document.scene, ("cube",)))
     assert document.history_bytes() - bare < 2000
+
+
+def test_paint_and_strokes_cost_what_they_hold() -> None:
+    at = np.zeros((1000, 3))
+    paint = Paint.of(at, at + (0, 1, 0), np.zeros(1000), {"color": at}, at)
+    numbers = np.zeros((1000, 1), np.float32)
+    marks = Marks(*(np.broadcast_to(numbers, (1000, width)).squeeze() for width in COLUMNS))
+    document = Document(little_scene())
+    document.apply(edits.SetPaint("cube", paint))
+    painted = document.history_bytes()
+    assert painted > 1000 * (7 + 3 + 3) * 4
+    document.apply(edits.Add((Stroke(id="stroke", objects=("cube",), table=marks.table()),)))
+    assert document.history_bytes() - painted == pytest.approx(1000 * WIDTH * 4, abs=4000)
 
 
 def test_a_receiver_that_fails_keeps_nobody_else_from_hearing() -> None:
