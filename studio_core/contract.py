@@ -321,6 +321,12 @@ class StrokeRun(Protocol):
         """
         ...
 
+    def shown(self, scene: Scene, strokes: Sequence[NodeId], lit: Lit, job: Job) -> Mapping[NodeId, Any]:
+        """By stroke that is no fixate the light (N, 3) at its marks, as materials and paint are now; NaN at
+        those that are not on what is shown. What was lacking when they were painted is added (`Marks`).
+        """
+        ...
+
     def stylise(self, scene: Scene, amount: float, lit: Lit, job: Job) -> Solution:
         """Paint on all objects under which the light of the scene is sharpened (figure 22) by an amount."""
         ...

@@ -77,6 +77,11 @@ class Rule:
             findings.append(Finding(node, 0, ids, tuple(ranked), close=1, silent=("shine",)))
         return Solution(Compound("Rule", tuple(edits)), tuple(findings), counts={"places": len(objects)})
 
+    def shown(self, scene: Scene, strokes: Sequence[NodeId], lit: Lit, job: Job) -> dict[NodeId, Any]:
+        """As it was painted."""
+        found = [node for node in map(scene.nodes.get, strokes) if isinstance(node, Stroke)]
+        return {stroke.id: stroke.marks.wanted for stroke in found if stroke.marks is not None}
+
     def stylise(self, scene: Scene, amount: float, lit: Lit, job: Job) -> Solution:
         """Every object gets as much more of its colour."""
         self.before()

@@ -57,6 +57,10 @@ class MeanRun:
         counts = {"places": sum(len(marks) for parts in wants.values() for _, marks in parts)}
         return Solution(Compound("Paint", tuple(edits)), tuple(found), ("the mean alone",), counts)
 
+    def shown(self, scene: Scene, strokes: Sequence[NodeId], lit: Lit, job: Job) -> Any:
+        """As before, whatever was painted."""
+        return {ident: scene[ident].marks.shown for ident in strokes}
+
     def likeness(self, scene: Scene, stroke: NodeId, lit: Lit, params: Any, job: Job) -> Any:
         """1 on the stroke's objects."""
         mesh = lit.surfaces.unrefined.mesh

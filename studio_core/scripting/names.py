@@ -59,7 +59,7 @@ GROUPS: dict[str, tuple[str, ...]] = {
         ),
         *("add_model", "add_material", "keep_material", "light_from", "apply", "undo", "redo"),
     ),
-    "Strokes": ("paint", "paint_strokes", "stylise"),
+    "Strokes": ("paint", "paint_strokes", "match_strokes", "stylise"),
     "Look and render": ("look_through", "picture", "render"),
     "Files": ("save",),
     "What there is": ("document", "scene", "session", "edits", "nodes", "np", "Path"),

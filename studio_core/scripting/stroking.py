@@ -38,6 +38,10 @@ class Stroking(ABC):
         """The scene as it is now."""
 
     @abstractmethod
+    def find(self, name: Any) -> Any:
+        """A node as it is now."""
+
+    @abstractmethod
     def _camera(self, camera: Any) -> Camera:
         """A camera as it is now."""
 
@@ -97,6 +101,40 @@ class Stroking(ABC):
         from studio_core.strokes.files import strokes_from_file
 
         return self._paint(strokes_from_file(Path(path)), solver, one_by_one, rounds)
+
+    def match_strokes(self, *strokes: Any, most: int = 8, solver: str = "joint") -> float:
+        """Explain strokes again, in the light that their change brings, until what was painted is seen.
+
+        All of them, or those of these names with all that are explained with them; at most so many times. One
+        step of the history. How far off it is then, relative: 0.01 is one percent.
+        """
+        from studio_core.strokes.edits import concerned
+        from studio_core.strokes.matching import Match
+        from studio_core.strokes.session import KIND, Easel
+        from studio_core.strokes.stroke import Stroke
+
+        scene, view, services = self.scene, self._session.view, self._services()
+        chosen = [self.find(one) for one in strokes] or [*scene.of(Stroke)]
+        for node in chosen:
+            if not isinstance(node, Stroke):
+                raise InputError(f"{node.name!r} is no stroke")
+        names = concerned(scene, chosen)
+        match = Match("Match strokes", scene, names, most=most)
+        if not match.wishes:
+            raise InputError("no stroke wants light that could be matched")
+
+        def work(job: Job) -> None:
+            finder, (backend, params, choice) = self._registry.get(KIND, solver), self._shaded_by()
+            easel, run = Easel(backend, params, services, choice), finder.open(services)
+            more = True
+            while more:
+                now = match.edit(scene)
+                easel.picture(now, view, job)
+                more = match.round(run, now, easel.lit(), finder.Params(), job)
+
+        self._run("Matching", work)
+        self._document.apply(match.edit)
+        return match.off
 
     def stylise(self, amount: float = 1.0, solver: str = "joint") -> None:
         """Paint all objects so that the scene's light is sharpened, or with a negative amount smoothed."""

@@ -39,6 +39,11 @@ class Marks:
     def __len__(self) -> int:
         return len(self.weight)
 
+    @property
+    def painted(self) -> npt.NDArray[np.bool_]:
+        """(N,) which want other light than there is."""
+        return np.asarray(np.not_equal(self.wanted, self.shown).any(axis=1), np.bool_)
+
     def some(self, which: npt.NDArray[np.generic]) -> Marks:
         """These of them."""
         return Marks(*(getattr(self, field.name)[which] for field in dataclasses.fields(self)))

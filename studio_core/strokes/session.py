@@ -14,7 +14,7 @@ from studio_core.edits import Add, Compound, Edit
 from studio_core.errors import InputError
 from studio_core.raster import PictureStage
 from studio_core.scene.diff import Aspect, Changes, diff, view_changed
-from studio_core.scene.nodes import MeshObject, NodeId, Scene, new_id
+from studio_core.scene.nodes import MeshObject, Scene, new_id
 from studio_core.session import View
 from studio_core.shading.artifacts import Picture
 from studio_core.shading.frame import Frame, IndirectChoice
@@ -23,14 +23,16 @@ from studio_core.shading.job import Job
 from studio_core.shading.pipeline import Pipeline
 from studio_core.strokes.edits import applied
 from studio_core.strokes.lit import lit_of
+from studio_core.strokes.matching import Match
 from studio_core.strokes.painting import marks_of, stroke_name, stroke_of
 from studio_core.strokes.planned import Look, MarkedStroke, Planned
-from studio_core.strokes.settling import Settling, as_found, as_painted, asking
 from studio_core.strokes.solution import Finding, Lit
 from studio_core.strokes.stroke import Stroke
 from studio_core.strokes.tools import Seen, wanted
 
 KIND = "solver"
+NEAR_ENOUGH = 0.002
+"""Of what is wanted: rounds that were asked for are not done then."""
 
 
 class Easel:
@@ -113,7 +115,6 @@ def _group(
     """With some strokes more, painted on what there was before."""
     scene, strokes, notes = before.scene, list[Stroke](), [*before.notes]
     pictures: dict[View, Picture] = {}
-    wishes: dict[NodeId, Settling] = {}
     for one in planned:
         job.checkpoint()
         fields = {"together": bool(strokes) and not apart, **one.fields}
@@ -125,16 +126,15 @@ def _group(
         view = one.look.view(scene)
         if view not in pictures:
             pictures[view] = easel.picture(scene, view, job)
-        shown = pictures[view]
-        seen = Seen.of(shown)
+        picture = pictures[view]
+        seen = Seen.of(picture)
         mask = one.gesture.mask(seen)
         wish = wanted(one.tool, seen, one.gesture, one.settings, mask)
-        marked = marks_of(shown, mask, wish)
+        marked = marks_of(picture, mask, wish)
         stroke = stroke_of(marked, scene, one.tool, **fields)
         notes += [*one.notes, *(f"{stroke.name}: {note}" for note in marked.notes)]
         if stroke.marks is not None:
             strokes.append(stroke)
-            wishes |= Settling.of(stroke.id, view, shown.linear, mask, wish)
     if not strokes:
         return dataclasses.replace(before, notes=tuple(notes))
     if not pictures:
@@ -143,13 +143,15 @@ def _group(
     there, asked = Add(tuple(strokes))(scene), [stroke.id for stroke in strokes]
     solution = run.solve(there, asked, easel.lit(), params, job)
     edit = applied(label, strokes, solution)
-    kept = as_painted(label, edit(scene), strokes)
-    for _ in range(1, 1 if any(stroke.indirect for stroke in strokes) else rounds):
-        now = edit(scene)
-        lit = {view: easel.picture(now, view, job).linear for view in pictures or (Look().view(scene),)}
-        wishes = {name: one.after(lit[one.view]) for name, one in wishes.items()}
-        solution = run.solve(asking(as_found(now, solution), wishes), asked, easel.lit(), params, job)
-        edit = Compound(label, (*edit.edits, solution.edit, kept))
+    if rounds > 1 and not any(stroke.indirect for stroke in strokes):
+        start, view = edit(scene), next(iter(pictures), Look().view(scene))
+        match = Match(label, start, tuple(asked), solution, met=NEAR_ENOUGH)
+        for _ in range(1, rounds):
+            now = match.edit(start)
+            easel.picture(now, view, job)
+            if not match.round(run, now, easel.lit(), params, job):
+                break
+        edit, solution = Compound(label, (*edit.edits, match.edit)), match.held or solution
     return Painted(
         edit(scene),
         (*before.edits, edit),

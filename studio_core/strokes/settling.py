@@ -10,7 +10,7 @@ to change by a factor wants ρ changed by its 1 + e-th root.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,12 +18,11 @@ import numpy.typing as npt
 
 from studio_core.arrays import frozen_map
 from studio_core.scene.nodes import NodeId, Scene
-from studio_core.session import View
+from studio_core.strokes.marks import Marks
 from studio_core.strokes.solution import Solution
 from studio_core.strokes.solved import Solved
 from studio_core.strokes.stroke import AUTOMATIC, FIXATE, Stroke
 
-F32 = npt.NDArray[np.float32]
 F64 = npt.NDArray[np.float64]
 
 LEAST = 1e-6
@@ -34,38 +33,51 @@ STEEPEST = 20.0
 
 @dataclass(frozen=True, eq=False)
 class Settling:
-    """One stroke on a picture: from where that is seen, how much each pixel counts (H, W), the mean light
-    (3,) that is wanted there, what there `was` last, what was `asked` for then, and how steeply (3,) the
-    picture follows.
+    """One stroke on its way: the mean light (3,) that it wants, what there `was` last, what was `asked` for
+    then, and how steeply (3,) that followed.
     """
 
-    view: View
-    share: F64
+    marks: Marks
     goal: F64
     was: F64
     asked: F64
     steep: F64
 
     @classmethod
-    def of(cls, name: NodeId, view: View, shown: F32, mask: F32, wanted: F32) -> dict[NodeId, Settling]:
-        """Of a stroke as it was painted, by its id; none where it says nothing."""
-        told = np.isfinite(wanted).all(axis=2) & (wanted != shown).any(axis=2)
-        share = np.where(told, mask, 0).astype(np.float64)
-        if share.sum() <= 0:
-            return {}
-        share /= share.sum()
-        goal = _mean(share, np.nan_to_num(wanted))
-        return {name: cls(view, share, goal, _mean(share, shown), goal, np.ones(3))}
+    def of(cls, stroke: Stroke) -> Settling | None:
+        """As it was painted, and asked for once; None where it says nothing that could be met."""
+        marks = stroke.marks
+        if marks is None or stroke.tool == FIXATE or stroke.indirect or not _share(marks).sum() > 0:
+            return None
+        goal, was = (_mean(_share(marks), light) for light in (marks.wanted, marks.shown))
+        return cls(marks, goal, was, goal, np.ones(3))
 
-    def after(self, shown: F32) -> Settling:
-        """With what is to be asked for, now that the last answer shows so."""
-        now = _mean(self.share, shown)
+    @property
+    def off(self) -> float:
+        """How far what there was last is from what is wanted: 0.01 is one percent, in the worst channel."""
+        return float(np.abs(np.log(self.was / self.goal)).max())
+
+    def after(self, light: F64) -> Settling:
+        """With what is to be asked for, now that the last answer makes the marks (N, 3) so light.
+
+        Where light is no number, as on things that are hidden now, marks do not count.
+        """
+        share = np.where(np.isfinite(light).all(axis=1), _share(self.marks), 0.0)
+        if share.sum() <= 0:
+            return self
+        now, goal = _mean(share, np.nan_to_num(light)), _mean(share, self.marks.wanted)
         step = np.log(self.asked / self.was)
         small = np.abs(step) < TOLD
         followed = np.log(now / self.was) / np.where(small, 1.0, step)
         steep = np.where(small, self.steep, np.clip(followed, 1.0, STEEPEST))
-        asked = now * (self.goal / now) ** (1 / steep)
-        return dataclasses.replace(self, was=now, asked=asked, steep=steep)
+        asked = now * (goal / now) ** (1 / steep)
+        return dataclasses.replace(self, goal=goal, was=now, asked=asked, steep=steep)
+
+
+def wishes_of(strokes: Iterable[Stroke]) -> dict[NodeId, Settling]:
+    """By stroke, those that count and want something."""
+    made = {stroke.id: Settling.of(stroke) for stroke in strokes if not stroke.hidden and stroke.weight > 0}
+    return {name: wish for name, wish in made.items() if wish is not None}
 
 
 def asking(scene: Scene, wishes: Mapping[NodeId, Settling]) -> Scene:
@@ -74,11 +86,11 @@ def asking(scene: Scene, wishes: Mapping[NodeId, Settling]) -> Scene:
     for name, wish in wishes.items():
         stroke = scene[name]
         assert isinstance(stroke, Stroke)
-        assert stroke.marks is not None
-        told = (stroke.marks.wanted != stroke.marks.shown).any(axis=1, keepdims=True)
-        scale = np.where(told, wish.asked / wish.goal, 1.0)
-        marks = dataclasses.replace(stroke.marks, wanted=np.asarray(stroke.marks.wanted * scale, np.float32))
-        made.append(dataclasses.replace(stroke, table=marks.table()))
+        marks = stroke.marks
+        assert marks is not None
+        scale = np.where(marks.painted[:, None], wish.asked / wish.goal, 1.0)
+        table = dataclasses.replace(marks, wanted=np.asarray(marks.wanted * scale, np.float32)).table()
+        made.append(dataclasses.replace(stroke, table=table))
     return scene.with_nodes(*made)
 
 
@@ -100,8 +112,12 @@ def as_painted(label: str, scene: Scene, strokes: list[Stroke]) -> Solved:
     return Solved(label, strokes=frozen_map(tables))
 
 
-def _mean(share: F64, light: F32) -> F64:
-    return np.asarray(np.maximum(np.einsum("hw,hwc->c", share, light.astype(np.float64)), LEAST))
+def _share(marks: Marks) -> F64:
+    return np.asarray(marks.weight * marks.painted, np.float64)
 
 
-__all__ = ["Settling", "as_found", "as_painted", "asking"]
+def _mean(share: F64, light: npt.NDArray[np.floating]) -> F64:
+    return np.asarray(np.maximum(np.average(light.astype(np.float64), axis=0, weights=share), LEAST))
+
+
+__all__ = ["Settling", "as_found", "as_painted", "asking", "wishes_of"]

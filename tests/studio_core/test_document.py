@@ -470,7 +470,7 @@ def test_a_shared_mesh_costs_once() -> None:
 
 def test_paint_and_strokes_cost_what_they_hold() -> None:
     at = np.zeros((1000, 3))
-    paint = Paint.of(at, at + (0, 1, 0), np.zeros(1000), {"color": at}, at)
+    paint = Paint.of(at, at + np.array([0, 1, 0]), np.zeros(1000), {"color": at}, at)
     numbers = np.zeros((1000, 1), np.float32)
     marks = Marks(*(np.broadcast_to(numbers, (1000, width)).squeeze() for width in COLUMNS))
     document = Document(little_scene())

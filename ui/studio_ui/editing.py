@@ -24,6 +24,7 @@ class Editing:
         self._last: Edit | None = None
         self._gesture: Gesture | None = None
         self._owner: object = None
+        self._gives_way = False
 
     @property
     def busy(self) -> bool:
@@ -40,12 +41,18 @@ class Editing:
             self.done.emit(edit)
         return True
 
-    def begin(self, owner: object, label: str) -> bool:
-        """Start a gesture; False while another one is under way."""
+    def begin(self, owner: object, label: str, *, gives_way: bool = False) -> bool:
+        """Start a gesture; False while another one is under way.
+
+        One that `gives_way` is no hand's: pictures are as at rest meanwhile, and the next gesture ends it.
+        """
+        if self._gesture is not None and self._gives_way:
+            self.finish()
         if self._gesture is not None:
             return False
-        self._gesture, self._owner = self.document.begin(label), owner
-        self.began.emit()
+        self._gesture, self._owner, self._gives_way = self.document.begin(label), owner, gives_way
+        if not gives_way:
+            self.began.emit()
         return True
 
     def preview(self, owner: object, edit: Edit) -> bool:

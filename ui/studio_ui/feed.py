@@ -181,6 +181,12 @@ class PictureFeed:
         choice = IndirectChoice(session.indirect, by_name) if session.bouncing else None
         return Frame(scene, view, session.params, 0, moving, indirect=choice, light=session.light)
 
+    @property
+    def at_rest(self) -> bool:
+        """Whether what is shown is the scene as it is now, lit as at rest, be it refined yet."""
+        refining = self.state is Freshness.REFINING and self.last is not None and not self.last.moving
+        return self.state is Freshness.CURRENT or refining
+
     def cancel(self) -> None:
         """Stop and keep what is shown."""
         self._changes = Changes()

@@ -10,8 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from studio_core.contract import Services
-from studio_core.scene.nodes import Material, NodeId
-from studio_core.strokes.marks import Marks
+from studio_core.scene.nodes import Material, MeshObject, NodeId, Scene
 from studio_core.strokes.paintable import paintable
 from studio_core.strokes.stroke import AUTOMATIC, FIXATE, Stroke
 from studio_plugins.slf.dressed import Dressed
@@ -87,6 +86,21 @@ def on_region(stroke: Stroke, places: Places, region: Region) -> npt.NDArray[np.
     return made
 
 
+def paint_under(scene: Scene, stroke: Stroke, region: Region) -> dict[str, F64]:
+    """By parameter (1,) or (3,), what paint changes of a region, in the mean over a stroke's marks on it."""
+    node, marks = scene[region.node], stroke.marks
+    paint = node.paint if isinstance(node, MeshObject) else None
+    if paint is None or marks is None:
+        return {}
+    on = np.array([name == region.node for name in stroke.objects], np.bool_)[marks.object]
+    there = marks.some(np.flatnonzero(on & (marks.slot == region.slot) & marks.painted & (marks.weight > 0)))
+    if not len(there):
+        return {}
+    between = paint.weights(there.place, there.normal, there.slot)
+    every = {name: between(paint.change(name)) for name in paint.changes}
+    return {name: np.average(one, axis=0, weights=there.weight) for name, one in every.items()}
+
+
 def samples_of(
     stroke: Stroke, places: Places, sums: F64, dressed: Dressed, now: Reflectance
 ) -> tuple[Samples, F64]:
@@ -101,9 +115,16 @@ def samples_of(
     known = np.isfinite(marks.offset).all(axis=1, keepdims=True)
     offset = np.where(known, marks.offset, shown - before)
     weight = marks.weight.astype(np.float64) * stroke.weight
-    one_light = stroke.flat & _painted(marks)  # as wanted in the mean over all of them, known well or not
+    one_light = stroke.flat & marks.painted  # as wanted in the mean over all of them, known well or not
     weight = weight * np.where(one_light, 1, _trust(offset, shown, before))
     return Samples(wanted - offset, before, sums[:-1], sums[-1], weight), offset
+
+
+def as_curved(samples: Samples, own: F64, dressed: Dressed, now: Reflectance) -> Samples:
+    """With other columns (N, T, 3) of the gloss that there is; what was painted is as far from that light."""
+    curved = dataclasses.replace(samples, own=own)
+    before = curved.made(dressed, now, own=True)
+    return dataclasses.replace(curved, before=before, wanted=samples.wanted + before - samples.before)
 
 
 def _trust(offset: F64, shown: F64, before: F64) -> F64:
@@ -114,11 +135,6 @@ def _trust(offset: F64, shown: F64, before: F64) -> F64:
     return np.asarray(1 / (1 + (relative / STRANGE) ** 2) ** 2)
 
 
-def _painted(marks: Marks) -> npt.NDArray[np.bool_]:
-    """(N,) which do not want what is shown."""
-    return np.asarray(np.not_equal(marks.wanted, marks.shown).any(axis=1), np.bool_)
-
-
 def pooled_of(parts: Sequence[tuple[Stroke, Samples, Places]], beside: bool = True) -> Samples:
     """All samples; of a stroke in one flat colour its mean, and what lies beside it as it is, or without."""
     made: Samples | None = None
@@ -126,7 +142,7 @@ def pooled_of(parts: Sequence[tuple[Stroke, Samples, Places]], beside: bool = Tr
         one = samples
         if stroke.flat and stroke.tool != FIXATE and stroke.marks is not None:
             marks = stroke.marks.some(places.mark)
-            painted = _painted(marks)
+            painted = marks.painted
             one = samples.some(np.flatnonzero(painted)).mean()
             if beside:
                 one = one + samples.some(np.flatnonzero(~painted))
@@ -238,11 +254,13 @@ __all__ = [
     "WORDS",
     "Painting",
     "Step",
+    "as_curved",
     "as_painted",
     "explained",
     "meant_first",
     "on_region",
     "one_light",
+    "paint_under",
     "pooled_of",
     "samples_of",
 ]

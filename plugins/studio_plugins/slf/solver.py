@@ -8,7 +8,7 @@ what was painted, minus what was shown. So what the model does not know (fine te
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -29,11 +29,13 @@ from studio_plugins.slf.dressed import Dressed
 from studio_plugins.slf.explaining import (
     Painting,
     Step,
+    as_curved,
     as_painted,
     explained,
     meant_first,
     on_region,
     one_light,
+    paint_under,
     pooled_of,
     samples_of,
 )
@@ -197,6 +199,24 @@ class JointRun:
         """See `studio_core.contract.StrokeRun`."""
         return stylise(scene, lit, Style(amount), self._services, job)
 
+    def shown(self, scene: Scene, strokes: Sequence[NodeId], lit: Lit, job: Job) -> Mapping[NodeId, Any]:
+        """See `studio_core.contract.StrokeRun`; of paint, its mean where a stroke lies counts."""
+        made: dict[NodeId, F64] = {}
+        for stroke in (node for node in map(scene.nodes.get, strokes) if isinstance(node, Stroke)):
+            if stroke.marks is None or stroke.tool == FIXATE:
+                continue
+            light = made[stroke.id] = np.full(stroke.marks.wanted.shape, np.nan)
+            for region in regions_of(stroke):
+                name = region.material(scene)
+                painting = Painting.begin(scene.material(name), self._services) if name is not None else None
+                if painting is None or region.node not in lit.surfaces.nodes:
+                    continue
+                painting.changes = paint_under(scene, stroke, region)
+                said = self._said(painting, region, (stroke,), scene, lit, job)
+                for _, samples, places in said.curved if said is not None else ():
+                    light[places.mark] = samples.before + stroke.marks.wanted[places.mark] - samples.wanted
+        return made
+
     def likeness(self, scene: Scene, stroke: NodeId, lit: Lit, params: Params, job: Job) -> Any:
         """See `studio_core.contract.StrokeRun`; before the stroke is solved, by materials as they are."""
         node = scene.nodes.get(stroke)
@@ -251,11 +271,10 @@ class JointRun:
         shapes, own_shape = dressed.shapes(), dressed.own_shape(gloss)
         every = np.concatenate([shapes, own_shape[None]])
         for stroke, places in seen:
-            sums, smooth, rays = self._sums(dressed, every, stroke, places, scene, lit, job)
+            sums, curving, rays = self._sums(dressed, every, stroke, places, scene, lit, job)
             painting.rays += rays
             samples, offset = samples_of(stroke, places, sums, dressed, now)
-            curving = samples if smooth is sums else samples_of(stroke, places, smooth, dressed, now)[0]
-            curved.append((stroke, curving, places))
+            curved.append((stroke, as_curved(samples, curving, dressed, now), places))
             painting.offsets.setdefault(stroke.id, []).append((places.mark, offset))
             parts.append((stroke, samples, places))
         return Said(tuple(parts), tuple(curved), now, gloss)
@@ -263,8 +282,8 @@ class JointRun:
     def _sums(
         self, dressed: Dressed, shapes: Any, stroke: Stroke, places: Places, scene: Scene, lit: Lit, job: Job
     ) -> tuple[F64, F64, int]:
-        """(L, N, T, 3) columns at a stroke's places; of a flat one also with the last level as surfaces curve
-        between vertices; and the rays that this took.
+        """(L, N, T, 3) columns at a stroke's places, the last (N, T, 3) as surfaces curve between vertices if
+        the stroke is a flat one, and the rays that this took.
         """
         assert stroke.marks is not None
         brdf, workers = dressed.resolved.brdf, self._services.workers
@@ -272,16 +291,15 @@ class JointRun:
         corners = Corners.of(lit, places, eye, workers)
         light = self._incident.at(scene, lit, corners.places, job)
         sums = sums_at(brdf.address, brdf.terms, shapes, light, corners.places, workers, job)
-        made = smooth = corners.between(sums)
-        rays = light.rays
+        made, rays = corners.between(sums), light.rays
+        own = made[-1]
         if stroke.flat and len(corners.bent):
             light = self._incident.at(scene, lit, corners.own, job)
-            smooth = made.copy()
-            smooth[-1, corners.bent] = sums_at(
-                brdf.address, brdf.terms, shapes[-1:], light, corners.own, workers, job
-            )[0]
+            there = sums_at(brdf.address, brdf.terms, shapes[-1:], light, corners.own, workers, job)
+            own = own.copy()
+            own[corners.bent] = there[0]
             rays += light.rays
-        return made, smooth, rays
+        return made, own, rays
 
 
 SOLVER = Joint()

@@ -200,6 +200,49 @@ def test_a_flat_colour_is_a_single_change(artist):
     assert all(" and " not in reason.meaning for reason in solution.findings[0].reasons)
 
 
+@pytest.mark.parametrize("values", [{"specular": (0.4, 0.4, 0.4)}, {"diffuse": (0.2, 0.4, 0.6)}])
+def test_to_explain_a_flat_colour_again_finds_the_same_amount(artist, values):
+    coarse = dataclasses.replace(room()["ball"], geometry=ball(around=20))
+    before, after = (scene.with_nodes(coarse) for scene in (room(), changed(**values)))
+    stroke = artist.stroke(before, after, flat=True)
+    solution, there = artist.solve(before, stroke)
+    painted = solution.edit(there)
+    again, _ = artist.solve(painted, painted[stroke.id])
+    one, other = (found.findings[0].reasons[0] for found in (solution, again))
+    assert one.meaning == other.meaning != ""
+    for name, value in one.values.items():
+        np.testing.assert_allclose(other.values[name], value, rtol=1e-3)
+
+
+@pytest.mark.parametrize("near", [0.0, 2.0])
+@pytest.mark.parametrize(
+    "values", [{"diffuse": (0.2, 0.4, 0.6)}, {"specular": (0.4,) * 3}, {"roughness": 0.3}]
+)
+def test_what_is_shown_now_is_what_the_picture_has(artist, values, near):
+    before = room()
+    stroke = artist.stroke(before, changed(**values), near=near)
+    solution, there = artist.solve(before, stroke)
+    painted = solution.edit(there)
+    shown, easel = artist.picture(painted)
+    light = artist.run.shown(painted, [stroke.id], easel.lit(), JOB)[stroke.id]
+    mask = (shown.node == shown.nodes.index("ball")).astype(np.float32)
+    rows = np.flatnonzero(mask.any(axis=1))
+    mask[rows[int(0.9 * len(rows)) :]] = 0
+    again = marks_of(shown, mask, shown.linear).marks
+    assert len(again) == len(light)
+    np.testing.assert_allclose(light.mean(axis=0), again.shown.mean(axis=0), rtol=0.02)
+    change = np.abs(again.shown - stroke.marks.shown).mean()
+    assert np.abs(light - again.shown).mean() < 0.2 * change
+
+
+def test_what_is_not_there_shows_nothing(artist):
+    before = room()
+    stroke = artist.stroke(before, changed(diffuse=(0.2, 0.4, 0.6)))
+    gone = room().with_nodes(dataclasses.replace(before["ball"], hidden=True), stroke)
+    _, easel = artist.picture(gone)
+    assert np.isnan(artist.run.shown(gone, [stroke.id], easel.lit(), JOB)[stroke.id]).all()
+
+
 def test_a_stroke_over_things_that_are_alike_changes_them_once(artist):
     def pair(values):
         left = dataclasses.replace(room()["ball"], transform=Transform((-0.55, 0.5, 0)))

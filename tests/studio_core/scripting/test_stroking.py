@@ -11,7 +11,7 @@ from scenes import little_scene
 from studio_core.contract import Services
 from studio_core.document import Document
 from studio_core.errors import EditError, InputError
-from studio_core.scene.nodes import Camera, MeshObject
+from studio_core.scene.nodes import Camera, Light, MeshObject
 from studio_core.scripting import Names
 from studio_core.session import Session, View
 from studio_core.strokes.stroke import Stroke
@@ -74,6 +74,31 @@ def test_the_background_is_said(names, capsys):
 def test_mistakes_are_told(names, values, error, words):
     with pytest.raises(error, match=words):
         names.paint(**{"path": CUBE, "size": SIZE} | values)
+
+
+def test_strokes_are_matched_again_when_lamps_have_changed(names):
+    names.paint(CUBE, "darken", size=SIZE, brush=0.15, stops=1.0, name="Darker")
+    document = names.namespace["document"]
+    assert names.match_strokes() <= 0.01
+    steps, painted = len(document.history), names.scene["cube"].paint
+    for light in names.scene.of(Light):
+        names.change(light, intensity=0.8 * light.intensity)
+    dimmed = names.scene
+    assert names.match_strokes("Darker") <= 0.01
+    assert document.history[-1].label == "Match strokes"
+    was, now = (paint.change("diffuse").mean() for paint in (painted, names.scene["cube"].paint))
+    assert was < now < 0, "it is to be less dark than before"
+    names.undo()
+    assert names.scene is dimmed
+    assert len(document.history) > steps
+
+
+@pytest.mark.parametrize(
+    ("asked", "words"), [(("Cube",), "is no stroke"), (("Attic",), "Attic"), ((), "no stroke")]
+)
+def test_what_cannot_be_matched_is_told(names, asked, words):
+    with pytest.raises((InputError, EditError), match=words):
+        names.match_strokes(*asked)
 
 
 def test_a_scene_is_sharpened_in_one_step(names):

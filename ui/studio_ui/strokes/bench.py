@@ -12,6 +12,7 @@ from studio_core.errors import InputError, PluginError
 from studio_core.scene.nodes import NodeId, Scene
 from studio_core.shading.job import Job
 from studio_core.strokes.edits import bared, concerned
+from studio_core.strokes.matching import Match
 from studio_core.strokes.solution import Lit, Solution
 from studio_core.strokes.stroke import Stroke
 
@@ -71,6 +72,11 @@ class Bench:
             run, params = self._run(solver)
             solution = run.solve(scene, strokes, lit, params, job)
         return Answer(edit, scene, strokes, solution)
+
+    def round(self, match: Match, scene: Scene, lit: Lit, solver: str, job: Job, *, sure: bool) -> bool:
+        """See `Match.round`."""
+        run, params = self._run(solver)
+        return match.round(run, scene, lit, params, job, sure=sure)
 
     def stylise(self, scene: Scene, amount: float, lit: Lit, solver: str, job: Job) -> Solution:
         """See `StrokeRun.stylise`."""

@@ -12,6 +12,7 @@ from PySide6.QtWidgets import (
     QCheckBox,
     QGridLayout,
     QHBoxLayout,
+    QPushButton,
     QSizePolicy,
     QToolButton,
     QWidget,
@@ -26,6 +27,7 @@ from studio_core.strokes.stroke import BLUR, BRIGHTEN, DARKEN, REPLACE, SHARPEN,
 from studio_ui.forms.fields import Combo
 from studio_ui.forms.param_form import ParamForm
 from studio_ui.forms.sinks import LiveSink
+from studio_ui.look.role import set_role
 from studio_ui.look.theme import GAP, Theme
 from studio_ui.panels.panel import Panel, heading, note, row
 from studio_ui.strokes.bench import Order
@@ -104,6 +106,15 @@ class StrokeControls(QWidget):
                  for name, info in param_infos(Stroke).items() if name in _STROKE}  # fmt: skip
         self.form = ParamForm(infos, sink)
         column.addWidget(self.form)
+        self.match = QPushButton()
+        self.match.setToolTip(
+            "What changes lights other things, and they light it: explain it again until the picture shows "
+            "what was painted"
+        )
+        self.match.clicked.connect(desk.match)
+        self.matched = note("")
+        column.addWidget(self.match)
+        column.addWidget(self.matched)
         column.addWidget(heading("Why"))
         self.why = Why(self._context.host, desk.sketches)
         self.why.taken = desk.work.take
@@ -164,6 +175,7 @@ class StrokeControls(QWidget):
     def _lit_otherwise(self, aspect: Aspect) -> None:
         if aspect & Aspect.INDIRECT:
             self._show_brush()
+            self._show_match()
 
     def paintEvent(self, event: QPaintEvent) -> None:
         """Solvers are asked for their names once somebody sees this: to ask loads them."""
@@ -237,6 +249,16 @@ class StrokeControls(QWidget):
             self.form.show_values({name: getattr(stroke, name) for name in _STROKE})
             self._show_spread()
         self._tell(scene, stroke)
+        self._show_match()
+
+    def _show_match(self) -> None:
+        matching, can = self._desk.matching, self._desk.can_match()
+        self.match.setText("Stop here" if matching.running else "Match what was painted")
+        self.match.setVisible(can or matching.running)
+        mine = matching.of == self._desk.stroke and self._desk.stroke is not None
+        self.matched.setText(matching.told if mine else "")
+        self.matched.setVisible(bool(self.matched.text()))
+        set_role(self.matched, "problem" if matching.failed else "dim")
 
     def _tell(self, scene: Scene, stroke: Stroke | None) -> None:
         desk = self._desk

@@ -49,6 +49,7 @@ class StrokeFeature:
             "stroke.softer": lambda: self.desk().store.harder(-1),
             "stroke.harder": lambda: self.desk().store.harder(),
             "stroke.indirect": self._turn,
+            "stroke.match": self._match,
             "stroke.stylise": self._stylise,
         }
 
@@ -86,6 +87,11 @@ class StrokeFeature:
         self._show()
         if self._panel.controls is not None:
             self._panel.controls.style_.unfold()
+
+    def _match(self) -> None:
+        """Where is told how far it is."""
+        self._show()
+        self.desk().match()
 
     # as a tool
 

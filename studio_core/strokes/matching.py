@@ -1,0 +1,91 @@
+"""Strokes that are explained again, under the light that the last answer brings, until they are met."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+from studio_core.contract import StrokeRun
+from studio_core.edits import Compound, Edit
+from studio_core.scene.nodes import NodeId, Scene
+from studio_core.shading.job import Job
+from studio_core.strokes.settling import Settling, as_found, as_painted, asking, wishes_of
+from studio_core.strokes.solution import Lit, Solution
+from studio_core.strokes.stroke import Stroke
+
+MET = 0.01
+"""So near, relative, is as wanted."""
+NEAR = 0.05
+"""So near only light that is as good as it gets tells more."""
+MOST = 8
+"""Answers."""
+IDLE = 2
+"""Answers in a row that bring nothing nearer, after which the best one is taken."""
+
+
+class Match:
+    """Strokes of a scene by name, that are explained together, as they were `held` to be if that is known.
+
+    `edit` makes of that scene what was found until now, `held` is the last answer. `offs` tells how far each
+    round found it from what is wanted: 0.01 is one percent, in the worst channel of the worst stroke.
+    """
+
+    def __init__(
+        self,
+        label: str,
+        scene: Scene,
+        names: tuple[NodeId, ...],
+        held: Solution | None = None,
+        most: int = MOST,
+        met: float = MET,
+    ) -> None:
+        self.label, self.names, self.offs = label, names, list[float]()
+        self._strokes = [node for name in names if isinstance(node := scene[name], Stroke)]
+        self.wishes: Mapping[NodeId, Settling] = wishes_of(self._strokes)
+        self._said = as_painted(label, scene, self._strokes)
+        self.held, self._most, self._met = held, most, met
+        self.near = False
+        self._edits: tuple[Edit, ...] = ()
+        self._best: tuple[float, tuple[Edit, ...]] = (math.inf, ())
+
+    @property
+    def edit(self) -> Compound:
+        """All answers, or when it is over those up to the best."""
+        return Compound(self.label, self._edits)
+
+    @property
+    def off(self) -> float:
+        """Of the best."""
+        return self._best[0]
+
+    def round(
+        self, run: StrokeRun, scene: Scene, lit: Lit, params: Any, job: Job, *, sure: bool = True
+    ) -> bool:
+        """Ask once more: `scene` is as `edit` makes it, `lit` its light. False when it is over.
+
+        Light that is not `sure` will be better soon: where that could decide, nothing is asked (`near`).
+        """
+        if not self.wishes:
+            return False
+        shown = run.shown(scene, tuple(self.wishes), lit, job)
+        wishes = {name: one.after(shown[name]) if name in shown else one for name, one in self.wishes.items()}
+        off = max(wish.off for wish in wishes.values())
+        self.near = off <= NEAR
+        if self.near and not sure:
+            return True
+        self.wishes = wishes
+        self.offs.append(off)
+        if self.offs[-1] < self.off:
+            self._best = (self.offs[-1], self._edits)
+        idle = len(self.offs) > IDLE and min(self.offs[-IDLE:]) >= min(self.offs[:-IDLE])
+        if self.offs[-1] <= self._met or len(self.offs) > self._most or idle:
+            self._edits = self._best[1]
+            return False
+        held = self.held or run.solve(scene, self.names, lit, params, job)
+        self.held = run.solve(asking(as_found(scene, held), self.wishes), self.names, lit, params, job)
+        self._edits = (*self._edits, self.held.edit, self._said)
+        return True
+
+
+__all__ = ["IDLE", "MET", "MOST", "NEAR", "Match"]
