@@ -21,7 +21,7 @@ NEAR = 0.05
 MOST = 8
 """Answers."""
 IDLE = 2
-"""Answers in a row that bring nothing nearer, after which the best one is taken."""
+"""Answers in a row that bring strokes no nearer, after which the best one is taken."""
 
 
 class Match:
@@ -47,6 +47,7 @@ class Match:
         self.held, self._most, self._met = held, most, met
         self.near = False
         self._edits: tuple[Edit, ...] = ()
+        self._sums: list[float] = []  # of all strokes' squared offs
         self._best: tuple[float, tuple[Edit, ...]] = (math.inf, ())
 
     @property
@@ -76,10 +77,12 @@ class Match:
             return True
         self.wishes = wishes
         self.offs.append(off)
-        if self.offs[-1] < self.off:
-            self._best = (self.offs[-1], self._edits)
-        idle = len(self.offs) > IDLE and min(self.offs[-IDLE:]) >= min(self.offs[:-IDLE])
-        if self.offs[-1] <= self._met or len(self.offs) > self._most or idle:
+        total = sum(wish.off**2 for wish in wishes.values())
+        if total < min(self._sums, default=math.inf):
+            self._best = (off, self._edits)
+        self._sums.append(total)
+        idle = len(self.offs) > IDLE and min(self._sums[-IDLE:]) >= min(self._sums[:-IDLE])
+        if off <= self._met or len(self.offs) > self._most or idle:
             self._edits = self._best[1]
             return False
         held = self.held or run.solve(scene, self.names, lit, params, job)

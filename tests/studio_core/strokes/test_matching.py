@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 
 import numpy as np
@@ -98,6 +99,21 @@ def test_light_that_will_be_better_soon_asks_and_decides_nothing_once_it_is_near
     assert (match.near, len(match.offs), len(match.edit.edits)) == (True, 1, 2)
     assert not match.round(world, met, None, None, JOB)
     assert match.off <= MET
+
+
+def test_one_stroke_that_cannot_be_met_keeps_no_other_from_it():
+    start = scene().with_nodes(dataclasses.replace(scene()["s"], id="t"))
+    world = World(lambda share: 0.5 * share + 0.5 * share**3)
+    start = world.solve(start, ["s"], None, None, JOB).edit(start)
+    follows, world.shown = world.shown, lambda scene, strokes, lit, job: {
+        **follows(scene, ("s",), lit, job), "t": scene["t"].marks.shown
+    }  # fmt: skip
+    match = Match("Match", start, ("s", "t"))
+    while match.round(world, match.edit(start), None, None, JOB):
+        pass
+    assert match.off == pytest.approx(math.log(SHOWN / GOAL))
+    shown = follows(match.edit(start), ("s",), None, JOB)["s"].mean()
+    assert abs(math.log(shown / GOAL)) < MET
 
 
 def test_no_more_answers_than_are_allowed():

@@ -59,9 +59,11 @@ class Matching(QObject):
 
     def start(self, stroke: NodeId) -> None:
         """Match it, and with it all strokes that it is explained with."""
-        scene, label = self._context.document.scene, f"Match {self._context.document.scene[stroke].name}"
+        scene = self._context.document.scene
         node = scene[stroke]
-        match = Match(label, scene, concerned(scene, (node,) if isinstance(node, Stroke) else ()))
+        assert isinstance(node, Stroke)
+        label = f"Match {node.name}"
+        match = Match(label, scene, concerned(scene, (node,)))
         if stroke in match.wishes and self._context.editing.begin(self, label, gives_way=True):
             self._match, self._seen, self.of = match, (), stroke
             self._say("Looking at the light there is…")
