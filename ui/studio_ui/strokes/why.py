@@ -146,7 +146,7 @@ class Why(QWidget):
         card.setIcon(QIcon(blank))
         name, where = reason.meaning or "no change", place(scene, finding.node, finding.slot)
         share = f"  {100 * min(max(reason.explained, 0.0), 1.0):.0f} %"
-        room = WIDTH - card.fontMetrics().horizontalAdvance(share)
+        room = WIDTH - card.fontMetrics().horizontalAdvance(f"{share}  ")  # Qt leaves a space at each end
         card.setText(card.fontMetrics().elidedText(short, Qt.TextElideMode.ElideRight, room) + share)
         name = f"{name} of {where}" if finding.rivals else name
         change = self._change(scene, finding, reason)(number)
