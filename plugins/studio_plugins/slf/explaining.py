@@ -204,8 +204,9 @@ def as_painted(
 ) -> Verdict:
     """With as much of the one number or colour that changes as makes what was `painted`, without its beside.
 
-    What lies beside one flat colour tells which parameter it is; that it stays is not meant as exactly.
-    A picture at rest has highlights as surfaces are `curved`, once there are any.
+    What lies beside one flat colour tells which parameter it is; that it stays is not meant as exactly, and
+    no part of what is said to be explained. A picture at rest has highlights as surfaces are `curved`, once
+    there are any.
     """
     painted, curved = (
         some.some(np.flatnonzero(some.finite & (some.weight > 0))) for some in (painted, curved)
@@ -216,7 +217,7 @@ def as_painted(
     staying = Shines.start(dressed, now, None)
 
     def sized(one: Explanation) -> Explanation:
-        found = one.reflectance
+        found, told = one.reflectance, curved
         if one.change is Change.DIFFUSE:
             made = best(here, dressed, now, True, staying)
         elif one.change is Change.SPECULAR:
@@ -226,11 +227,14 @@ def as_painted(
             levels = found.level + np.linspace(-NEAR, NEAR, 2 * STEPS + 1)
             levels = levels[(levels >= 0) & (levels <= painted.levels - 1)]
             levels = levels[np.sign(levels - now.level) == np.sign(found.level - now.level)]
+            told = painted
             grams = Grams.of(painted, levels, painted.importance)
             made = best(grams, dressed, now, False, staying)
         else:
             return one
-        return dataclasses.replace(one, reflectance=made.reflectance)
+        asked = float((told.importance * (told.wanted - told.before) ** 2).sum())
+        explained = 1 - made.left / asked if asked > 0 else one.explained
+        return dataclasses.replace(one, reflectance=made.reflectance, explained=explained)
 
     return dataclasses.replace(verdict, explanations=tuple(map(sized, verdict.explanations)))
 
