@@ -124,7 +124,7 @@ def test_what_never_follows_is_left_as_it_was(painter: Driver, rule: World) -> N
     assert painter.labels()[-1] == "Paint colour on Stool"
 
 
-@pytest.mark.parametrize("how", ["escape", "stop", "edit", "paint"])
+@pytest.mark.parametrize("how", ["escape", "stop", "edit", "paint", "undo"])
 def test_it_gives_way(painter: Driver, rule: World, how: str) -> None:
     driver, matching, scene = painter, desk(painter).matching, painter.document.scene
     driver.session.select(["seat"])
@@ -132,6 +132,7 @@ def test_it_gives_way(painter: Driver, rule: World, how: str) -> None:
         "escape": driver.context.editing.cancel_any,
         "stop": matching.stop,
         "edit": driver.window.commands.hide,
+        "undo": driver.context.editing.undo,
         "paint": lambda: desk(driver).work.begin("Paint"),
     }
     calls, done = len(rule.calls), threading.Event()
@@ -153,9 +154,18 @@ def test_it_gives_way(painter: Driver, rule: World, how: str) -> None:
     assert matching.told.startswith("Stopped ")
     matched = "Match Colour on Stool" in driver.labels()
     assert matched == (how != "escape")
-    assert (driver.document.scene is scene) == (how == "escape")
+    assert (driver.document.scene is scene) == (how in ("escape", "undo"))
     assert (driver.labels()[-1] == "Hide Seat") == (how == "edit")
     driver.context.editing.cancel_any()
+
+
+def test_a_window_may_close_meanwhile(painter: Driver, rule: World) -> None:
+    asked = threading.Event()
+    rule.before = asked.set
+    desk(painter).matching.start(stroke_of(painter).id)
+    painter.until(asked.is_set)
+    painter.close()
+    assert not desk(painter).matching.running
 
 
 def test_what_fails_is_told_and_leaves_nothing(painter: Driver, rule: World) -> None:
