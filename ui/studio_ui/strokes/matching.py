@@ -79,9 +79,12 @@ class Matching(QObject):
         solver, bench = self._store.now.solver, self._bench
         if match is None:
             return
-        sure = feed.state is Freshness.CURRENT
+        sure = feed.state is Freshness.CURRENT or not feed.busy  # nobody goes on where it was stopped
+        if feed.state in (Freshness.NONE, Freshness.FAILED) and not feed.busy:
+            self._fail(NOT_YET)
+            return
         if not feed.at_rest or (match.near and not sure):
-            self._wait()
+            self._again.start()
             return
 
         def work(pipeline: Any, job: Job) -> bool | None:
@@ -93,19 +96,14 @@ class Matching(QObject):
                 return
             if error is not None:
                 self._fail(error)
-            elif more is None:
-                self._wait()
-            else:
+            elif more is not None:
                 self._take(match, more)
+            elif sure and self._context.document.scene is scene:
+                self._fail(NOT_YET)  # nor will there be: its backend keeps nothing that strokes need
+            else:
+                self._again.start()
 
         self._job = feed.ask("matching", scene, work, done)
-
-    def _wait(self) -> None:
-        feed = self._context.feed
-        if feed.busy or feed.last is None or feed.state in (Freshness.STALE, Freshness.REFINING):
-            self._again.start()
-        else:
-            self._fail(NOT_YET)
 
     def _take(self, match: Match, more: bool) -> None:
         if match.edit.edits != self._seen:
