@@ -95,10 +95,10 @@ def stroke_of(driver: Driver) -> Stroke:
 
 
 def match(driver: Driver) -> str:
-    """Until it is over: what is told then."""
-    matching = desk(driver).matching
+    """Until it is over, and what is found now is told: the words for how it went."""
+    matching, work = desk(driver).matching, desk(driver).work
     matching.start(stroke_of(driver).id)
-    driver.until(lambda: not matching.running)
+    driver.until(lambda: not matching.running and not work.asking)
     return matching.told
 
 
