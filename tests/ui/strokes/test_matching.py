@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from painting_support import PLUGIN, Rule, brush_in_hand, controls, desk, studio_of
+from painting_support import Rule, brush_in_hand, controls, desk, studio_of
 from PySide6.QtCore import QPoint
 from pytestqt.qtbot import QtBot
 from ui_support import Driver
@@ -65,19 +65,16 @@ def share(scene: Scene) -> Any:
 
 
 @pytest.fixture
-def rule(monkeypatch: pytest.MonkeyPatch) -> World:
-    fresh = World()
-    monkeypatch.setattr("painting_support.SOLVER", fresh)
-    return fresh
+def rule() -> World:
+    return World()
 
 
 @pytest.fixture
-def painter(rule: World, qtbot: QtBot, tmp_path: Path) -> Iterator[Driver]:
+def painter(painter: Driver) -> Driver:
     """With a stroke on the stool."""
-    for driver in brush_in_hand(studio_of(tmp_path / "state", qtbot, PLUGIN)):
-        desk(driver).store.use(colour=(0.4, 0.3, 0.3))
-        paint(driver)
-        yield driver
+    desk(painter).store.use(colour=(0.4, 0.3, 0.3))
+    paint(painter)
+    return painter
 
 
 def paint(driver: Driver) -> Stroke:

@@ -2,29 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from pathlib import Path
-
 import pytest
-from painting_support import PLUGIN, Rule, brush_in_hand, controls, studio_of
-from pytestqt.qtbot import QtBot
+from painting_support import Rule, controls
 from ui_support import Driver
 
 from studio_core.errors import InputError
 from studio_core.scene.nodes import MeshObject
 from studio_ui.strokes.scene_style import SceneStyle
-
-
-@pytest.fixture
-def rule(monkeypatch: pytest.MonkeyPatch) -> Rule:
-    fresh = Rule()
-    monkeypatch.setattr("painting_support.SOLVER", fresh)
-    return fresh
-
-
-@pytest.fixture
-def painter(rule: Rule, qtbot: QtBot, tmp_path: Path) -> Iterator[Driver]:
-    yield from brush_in_hand(studio_of(tmp_path / "state", qtbot, PLUGIN))
 
 
 def style(driver: Driver) -> SceneStyle:

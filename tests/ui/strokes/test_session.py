@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from names import nameless
-from painting_support import PLUGIN, Rule, brush_in_hand, controls, desk, studio_of
+from painting_support import Rule, brush_in_hand, controls, desk, studio_of
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtGui import QPalette
 from PySide6.QtWidgets import QLabel, QToolButton
@@ -32,19 +32,6 @@ ALT, CTRL, SHIFT = (
     Qt.KeyboardModifier.ShiftModifier,
 )
 STOOL = (1.0, 0.5, 0.5)
-
-
-@pytest.fixture
-def rule(monkeypatch: pytest.MonkeyPatch) -> Rule:
-    fresh = Rule()
-    monkeypatch.setattr("painting_support.SOLVER", fresh)
-    return fresh
-
-
-@pytest.fixture
-def painter(rule: Rule, qtbot: QtBot, tmp_path: Path) -> Iterator[Driver]:
-    """A window with the brush in the hand."""
-    yield from brush_in_hand(studio_of(tmp_path / "state", qtbot, PLUGIN))
 
 
 def strokes(driver: Driver) -> list[Stroke]:
