@@ -110,7 +110,7 @@ class Stroking(ABC):
         """
         from studio_core.strokes.edits import concerned
         from studio_core.strokes.matching import Match
-        from studio_core.strokes.session import KIND, Easel
+        from studio_core.strokes.session import KIND, Easel, play
         from studio_core.strokes.stroke import Stroke
 
         scene, view, services = self.scene, self._session.view, self._services()
@@ -125,12 +125,8 @@ class Stroking(ABC):
 
         def work(job: Job) -> None:
             finder, (backend, params, choice) = self._registry.get(KIND, solver), self._shaded_by()
-            easel, run = Easel(backend, params, services, choice), finder.open(services)
-            more = True
-            while more:
-                now = match.edit(scene)
-                easel.picture(now, view, job)
-                more = match.round(run, now, easel.lit(), finder.Params(), job)
+            easel = Easel(backend, params, services, choice)
+            play(match, scene, finder.open(services), finder.Params(), easel, view, job)
 
         self._run("Matching", work)
         self._document.apply(match.edit)

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from studio_core.contract import StrokeRun
-from studio_core.edits import Compound, Edit
+from studio_core.edits import Compound
 from studio_core.scene.nodes import NodeId, Scene
 from studio_core.shading.job import Job
 from studio_core.strokes.settling import Settling, as_found, as_painted, asking, wishes_of
@@ -27,8 +27,8 @@ IDLE = 2
 class Match:
     """Strokes of a scene by name, that are explained together, as they were `held` to be if that is known.
 
-    `edit` makes of that scene what was found until now, `held` is the last answer. `offs` tells how far each
-    round found it from what is wanted: 0.01 is one percent, in the worst channel of the worst stroke.
+    `edit` makes of that scene what was found until now. `offs` tells how far each round found it from what is
+    wanted: 0.01 is one percent, in the worst channel of the worst stroke.
     """
 
     def __init__(
@@ -44,21 +44,29 @@ class Match:
         self._strokes = [node for name in names if isinstance(node := scene[name], Stroke)]
         self.wishes: Mapping[NodeId, Settling] = wishes_of(self._strokes)
         self._said = as_painted(label, scene, self._strokes)
-        self.held, self._most, self._met = held, most, met
+        self._given, self._most, self._met = held, most, met
         self.near = False
-        self._edits: tuple[Edit, ...] = ()
-        self._sums: list[float] = []  # of all strokes' squared offs
-        self._best: tuple[float, tuple[Edit, ...]] = (math.inf, ())
+        self._answers: list[Solution] = []
+        self._sums: list[float] = []  # of all strokes' squared offs, before each answer
 
     @property
     def edit(self) -> Compound:
         """All answers, or when it is over those up to the best."""
-        return Compound(self.label, self._edits)
+        return Compound(self.label, tuple(edit for one in self._answers for edit in (one.edit, self._said)))
+
+    @property
+    def held(self) -> Solution | None:
+        """The last of these answers."""
+        return self._answers[-1] if self._answers else self._given
 
     @property
     def off(self) -> float:
         """Of the best."""
-        return self._best[0]
+        return self.offs[self._best] if self.offs else math.inf
+
+    @property
+    def _best(self) -> int:
+        return self._sums.index(min(self._sums))
 
     def round(
         self, run: StrokeRun, scene: Scene, lit: Lit, params: Any, job: Job, *, sure: bool = True
@@ -77,17 +85,14 @@ class Match:
             return True
         self.wishes = wishes
         self.offs.append(off)
-        total = sum(wish.off**2 for wish in wishes.values())
-        if total < min(self._sums, default=math.inf):
-            self._best = (off, self._edits)
-        self._sums.append(total)
+        self._sums.append(sum(wish.off**2 for wish in wishes.values()))
         idle = len(self.offs) > IDLE and min(self._sums[-IDLE:]) >= min(self._sums[:-IDLE])
         if off <= self._met or len(self.offs) > self._most or idle:
-            self._edits = self._best[1]
+            del self._answers[self._best :]
             return False
         held = self.held or run.solve(scene, self.names, lit, params, job)
-        self.held = run.solve(asking(as_found(scene, held), self.wishes), self.names, lit, params, job)
-        self._edits = (*self._edits, self.held.edit, self._said)
+        there = asking(as_found(scene, held), self.wishes)
+        self._answers.append(run.solve(there, self.names, lit, params, job))
         return True
 
 

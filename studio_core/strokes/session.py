@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -146,11 +147,7 @@ def _group(
     if rounds > 1 and not any(stroke.indirect for stroke in strokes):
         start, view = edit(scene), next(iter(pictures), Look().view(scene))
         match = Match(label, start, tuple(asked), solution, met=NEAR_ENOUGH)
-        for _ in range(1, rounds):
-            now = match.edit(start)
-            easel.picture(now, view, job)
-            if not match.round(run, now, easel.lit(), params, job):
-                break
+        play(match, start, run, params, easel, view, job, rounds - 1)
         edit, solution = Compound(label, (*edit.edits, match.edit)), match.held or solution
     return Painted(
         edit(scene),
@@ -160,6 +157,24 @@ def _group(
         (*notes, *solution.notes),
         frozen_map(Counter(before.counts) + Counter(solution.counts)),
     )
+
+
+def play(
+    match: Match,
+    start: Scene,
+    run: StrokeRun,
+    params: Any,
+    easel: Easel,
+    view: View,
+    job: Job,
+    rounds: int | None = None,
+) -> None:
+    """Rounds of a match from a scene on, each with a picture: so many, or until it is over."""
+    for _ in itertools.count() if rounds is None else range(rounds):
+        now = match.edit(start)
+        easel.picture(now, view, job)
+        if not match.round(run, now, easel.lit(), params, job):
+            break
 
 
 def _marked(scene: Scene, planned: MarkedStroke, fields: Mapping[str, Any]) -> Stroke:
@@ -175,4 +190,4 @@ def _marked(scene: Scene, planned: MarkedStroke, fields: Mapping[str, Any]) -> S
     return Stroke(id=new_id("stroke"), tool=planned.tool, objects=tuple(objects), table=table, **given)
 
 
-__all__ = ["KIND", "Easel", "Painted", "paint_and_solve"]
+__all__ = ["KIND", "Easel", "Painted", "paint_and_solve", "play"]

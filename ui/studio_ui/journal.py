@@ -15,6 +15,12 @@ from studio_core.signal import Signal
 Level = Literal["note", "warning", "problem"]
 
 
+def cause_of(error: BaseException) -> str:
+    """Its first line, or of one that says nothing its kind."""
+    told = str(error).strip()
+    return told.splitlines()[0] if told else type(error).__name__
+
+
 @dataclass(frozen=True)
 class Entry:
     """One line; `detail` is for whoever looks closer (a traceback)."""
@@ -52,10 +58,9 @@ class Journal:
         if isinstance(error, LucarneError):
             text = str(error)
         else:
-            cause = str(error).strip().splitlines()[0] if str(error).strip() else type(error).__name__
             plugin = self.blame(doing, error)
             fault = f"the plugin {plugin}" if plugin else "the program or a plugin"
-            text = f"{doing} did not work because of a fault in {fault} ({cause})."
+            text = f"{doing} did not work because of a fault in {fault} ({cause_of(error)})."
         self.write(text, "problem", "".join(traceback.format_exception(error)))
         return text
 

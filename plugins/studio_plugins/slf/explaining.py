@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from studio_core.contract import Services
 from studio_core.scene.nodes import Material, MeshObject, NodeId, Scene
+from studio_core.strokes.marks import Marks
 from studio_core.strokes.paintable import paintable
 from studio_core.strokes.stroke import AUTOMATIC, FIXATE, Stroke
 from studio_plugins.slf.dressed import Dressed
@@ -81,8 +82,12 @@ class Painting:
 def on_region(stroke: Stroke, places: Places, region: Region) -> npt.NDArray[np.bool_]:
     """(N,) which of a stroke's places lie on a region."""
     assert stroke.marks is not None
+    return _marks_on(stroke, stroke.marks, region)[places.mark]
+
+
+def _marks_on(stroke: Stroke, marks: Marks, region: Region) -> npt.NDArray[np.bool_]:
     node = np.array([name == region.node for name in stroke.objects], np.bool_)
-    made: npt.NDArray[np.bool_] = node[stroke.marks.object[places.mark]] & (places.slot == region.slot)
+    made: npt.NDArray[np.bool_] = node[marks.object] & (marks.slot == region.slot)
     return made
 
 
@@ -92,8 +97,7 @@ def paint_under(scene: Scene, stroke: Stroke, region: Region) -> dict[str, F64]:
     paint = node.paint if isinstance(node, MeshObject) else None
     if paint is None or marks is None:
         return {}
-    on = np.array([name == region.node for name in stroke.objects], np.bool_)[marks.object]
-    there = marks.some(np.flatnonzero(on & (marks.slot == region.slot) & marks.painted & (marks.weight > 0)))
+    there = marks.some(_marks_on(stroke, marks, region) & marks.painted & (marks.weight > 0))
     if not len(there):
         return {}
     between = paint.weights(there.place, there.normal, there.slot)
@@ -208,9 +212,7 @@ def as_painted(
     no part of what is said to be explained. A picture at rest has highlights as surfaces are `curved`, once
     there are any.
     """
-    painted, curved = (
-        some.some(np.flatnonzero(some.finite & (some.weight > 0))) for some in (painted, curved)
-    )
+    painted, curved = painted.that_count(), curved.that_count()
     if not len(painted) or not len(curved):
         return verdict
     here = Grams.of(curved, np.array([now.level]), curved.importance, curved.own[None])

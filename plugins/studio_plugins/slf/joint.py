@@ -105,7 +105,7 @@ def decide(
     The shine keeps its colour, or takes one of the `tints` (3,), which cost two numbers more. Nothing
     at all explains a stroke on which no light falls: then the one explanation is that nothing changes.
     """
-    samples = samples.some(np.flatnonzero(samples.finite & (samples.weight > 0)))
+    samples = samples.that_count()
     total = samples.weight.sum() * 3
     if not len(samples) or total <= 0:
         nothing = Explanation(Change.NONE, now, 0.0, 0.0, 0.0)

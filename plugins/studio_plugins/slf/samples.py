@@ -86,6 +86,10 @@ class Samples:
         wanted, before, own = self.wanted[which], self.before[which], self.own[which]
         return Samples(wanted, before, self.terms[:, which], own, self.weight[which])
 
+    def that_count(self) -> Samples:
+        """Those with numbers that are some, and a weight."""
+        return self.some(np.flatnonzero(self.finite & (self.weight > 0)))
+
     def __add__(self, other: Samples) -> Samples:
         """Both, of the same material."""
         return Samples(

@@ -212,7 +212,7 @@ class JointRun:
                 if painting is None or region.node not in lit.surfaces.nodes:
                     continue
                 painting.changes = paint_under(scene, stroke, region)
-                said = self._said(painting, region, (stroke,), scene, lit, job)
+                said = self._said(painting, region, (stroke,), scene, lit, job, as_it_is=True)
                 for _, samples, places in said.curved if said is not None else ():
                     light[places.mark] = samples.before + stroke.marks.wanted[places.mark] - samples.wanted
         return made
@@ -253,8 +253,12 @@ class JointRun:
         scene: Scene,
         lit: Lit,
         job: Job,
+        as_it_is: bool = False,
     ) -> Said | None:
-        """What strokes say of a region's material; None where they do not lie on it."""
+        """What strokes say of a region's material; None where they do not lie on it.
+
+        With `as_it_is` there are columns of the gloss that there is alone.
+        """
         parts: list[tuple[Stroke, Samples, Places]] = []
         curved: list[tuple[Stroke, Samples, Places]] = []
         dressed, mesh = painting.dressed, lit.surfaces.unrefined.mesh
@@ -268,8 +272,8 @@ class JointRun:
             return None
         uvs = mesh.uvs[np.concatenate([places.vertex for _, places in seen])]
         now, gloss = dressed.now(uvs, painting.changes)
-        shapes, own_shape = dressed.shapes(), dressed.own_shape(gloss)
-        every = np.concatenate([shapes, own_shape[None]])
+        own_shape = dressed.own_shape(gloss)[None]
+        every = own_shape if as_it_is else np.concatenate([dressed.shapes(), own_shape])
         for stroke, places in seen:
             sums, curving, rays = self._sums(dressed, every, stroke, places, scene, lit, job)
             painting.rays += rays

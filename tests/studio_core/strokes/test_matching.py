@@ -87,6 +87,8 @@ def test_the_best_is_kept_where_light_goes_to_and_fro():
     assert match.offs == pytest.approx([math.log(3 * a) for a in (0.6, 0.45, 0.7, 0.8)])
     assert len(match.offs) == 2 + IDLE
     assert match.edit.edits == edits[0], "that of the round before the best was seen"
+    assert match.held is not None
+    assert match.held.edit is match.edit.edits[-2], "what is told is what is kept"
 
 
 def test_light_that_will_be_better_soon_asks_and_decides_nothing_once_it_is_near():

@@ -21,6 +21,7 @@ from studio_core.strokes.matching import MET, Match
 from studio_core.strokes.stroke import Stroke
 from studio_ui.context import Context, Subscriptions
 from studio_ui.feed import Freshness
+from studio_ui.journal import cause_of
 from studio_ui.strokes.bench import NOT_YET, Bench, lit_for
 from studio_ui.strokes.brush_store import BrushStore
 
@@ -127,7 +128,7 @@ class Matching(QObject):
             self._say("")
             return
         self._context.journal.problem(label, error)
-        self._say(str(error).splitlines()[0] if str(error) else type(error).__name__, failed=True)
+        self._say(cause_of(error), failed=True)
 
     def _over(self) -> None:
         self._match, job, self._job = None, self._job, None

@@ -17,6 +17,7 @@ from studio_core.strokes.stylising import Stylising
 from studio_ui.context import Context
 from studio_ui.forms.param_form import ParamForm, fold
 from studio_ui.forms.sinks import LiveSink
+from studio_ui.journal import cause_of
 from studio_ui.look.role import set_role
 from studio_ui.look.theme import GAP
 from studio_ui.panels.panel import note
@@ -108,7 +109,7 @@ class SceneStyle(QWidget):
     def _fail(self, error: Exception) -> None:
         if not isinstance(error, Cancelled):
             self._context.journal.problem("Stylising", error)
-            self._say(str(error).splitlines()[0] if str(error) else type(error).__name__, problem=True)
+            self._say(cause_of(error), problem=True)
 
     def _say(self, text: str, *, problem: bool = False) -> None:
         self.told.setText(text)

@@ -19,6 +19,7 @@ from studio_core.signal import Signal
 from studio_core.strokes.solution import Finding, Lit, Reason, Solution
 from studio_core.strokes.stroke import Stroke
 from studio_ui.context import Context, Subscriptions
+from studio_ui.journal import cause_of
 from studio_ui.strokes.bench import NOT_YET, Answer, Bench, Order, lit_for
 from studio_ui.strokes.brush_store import BrushStore
 
@@ -232,7 +233,7 @@ class StrokeWork(QObject):
 
     def _fail(self, error: Exception) -> None:
         if not isinstance(error, Cancelled):
-            self.problem = str(error).splitlines()[0] if str(error) else type(error).__name__
+            self.problem = cause_of(error)
             self._context.journal.problem(self._label or "Explaining a stroke", error)
         self._explaining = self._newest = None
         if self._begun:
